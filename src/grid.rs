@@ -76,20 +76,6 @@ impl Axis {
     pub(crate) fn round_off(&self, x: f64) -> f64 {
         ON_NODE * (x.abs() + self.origin.abs()) / self.spacing
     }
-
-    /// Last node of the axis.
-    ///
-    /// ```
-    /// use bfree::grid::Axis;
-    ///
-    /// // n cells have n + 1 nodes, 0 to n.
-    /// let axis = Axis { origin: 0.0, spacing: 0.5, cells: 4 };
-    /// assert_eq!(axis.origin + axis.last() as f64 * axis.spacing, 2.0);
-    /// ```
-    #[inline]
-    pub fn last(&self) -> i64 {
-        i64::from(self.cells)
-    }
 }
 
 impl<const D: usize> Grid<D> {
@@ -122,13 +108,7 @@ impl<const D: usize> Grid<D> {
     /// Index along each axis of the node numbered `id`.
     #[inline]
     pub fn index(&self, id: u64) -> [u32; D] {
-        let mut rest = id;
-        std::array::from_fn(|k| {
-            let nodes = u64::from(self.cells[k]) + 1;
-            let index = rest % nodes;
-            rest /= nodes;
-            index as u32
-        })
+        digits(id, self.cells.map(|n| u64::from(n) + 1)).map(|index| index as u32)
     }
 
     /// Position of the node with the given index.
@@ -162,11 +142,8 @@ impl<const D: usize> Grid<D> {
     /// assert_eq!(grid.cell(&Vector::from([-0.1, 0.3])), None);
     /// ```
     pub fn cell(&self, x: &Vector<f64, D>) -> Option<[u32; D]> {
-        let mut cell = [0; D];
-        for k in 0..D {
-            cell[k] = (self.axis(k).local(x[k])? as u32).min(self.cells[k].saturating_sub(1));
-        }
-        Some(cell)
+        self.contains(x)
+            .then(|| std::array::from_fn(|k| (self.axis(k).spacings(x[k]) as u32).min(self.cells[k].saturating_sub(1))))
     }
 
     /// The cells at most `reach` cells away from a cell along each axis, with the cell itself.
@@ -179,13 +156,16 @@ impl<const D: usize> Grid<D> {
 
 /// All indices below `count`, the first axis fastest.
 pub(crate) fn indices<const D: usize>(count: [u64; D]) -> impl Iterator<Item = [u64; D]> {
-    (0..count.iter().product()).map(move |id| {
-        let mut rest: u64 = id;
-        std::array::from_fn(|k| {
-            let index = rest % count[k];
-            rest /= count[k];
-            index
-        })
+    (0..count.iter().product()).map(move |id| digits(id, count))
+}
+
+/// The index along each axis of the `id`-th of `count` points, the first axis fastest.
+#[inline]
+fn digits<const D: usize>(mut id: u64, count: [u64; D]) -> [u64; D] {
+    count.map(|n| {
+        let index = id % n;
+        id /= n;
+        index
     })
 }
 

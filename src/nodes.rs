@@ -14,7 +14,7 @@ use std::sync::Arc;
 /// // Two particles in neighbouring cells of a grid of 100 × 100 cells share two of their nodes.
 /// let grid = Grid { origin: Vector::zeros(), spacing: 1.0, cells: [100, 100] };
 /// let cell = |i| [grid.id([i, 7]), grid.id([i + 1, 7]), grid.id([i, 8]), grid.id([i + 1, 8])];
-/// let nodes = Nodes::new([cell(3), cell(4)].iter().map(|ids| ids.as_slice()));
+/// let nodes = Nodes::new([cell(3), cell(4)].concat());
 /// assert_eq!((nodes.len(), nodes.is_empty()), (6, false));
 /// // Unknowns are numbered by active nodes, in the order of the grid.
 /// assert_eq!(nodes.number(grid.id([5, 7])), Some(2));
@@ -28,12 +28,8 @@ pub struct Nodes {
 }
 
 impl Nodes {
-    /// From lists of grid numbers, in any order and with repetitions.
-    pub fn new<'a>(lists: impl Iterator<Item = &'a [u64]>) -> Self {
-        let mut ids = Vec::new();
-        for list in lists {
-            ids.extend_from_slice(list);
-        }
+    /// From grid numbers in any order, with repetitions.
+    pub fn new(mut ids: Vec<u64>) -> Self {
         ids.sort_unstable();
         ids.dedup();
         Self::ascending(ids)
@@ -70,13 +66,7 @@ impl Nodes {
     }
 
     /// Index along each axis and position of every active node.
-    pub fn positions<'a, const D: usize>(
-        &'a self,
-        grid: &'a Grid<D>,
-    ) -> impl Iterator<Item = ([u32; D], Vector<f64, D>)> + 'a {
-        self.ids.iter().map(move |&id| {
-            let index = grid.index(id);
-            (index, grid.position(index))
-        })
+    pub fn positions<const D: usize>(&self, grid: &Grid<D>) -> impl Iterator<Item = ([u32; D], Vector<f64, D>)> {
+        self.ids.iter().map(|&id| grid.index(id)).map(|index| (index, grid.position(index)))
     }
 }

@@ -1,7 +1,9 @@
 //! Knot cells of the bodies: the search for good cells, and the good cells whose polynomials an outer node follows.
 
 use super::pieces::Pieces;
+use crate::grid::indices;
 use std::collections::{BTreeMap, HashMap, HashSet};
+use std::ops::RangeInclusive;
 
 /// The part of the grid that a body occupies. Indices have three components; an axis beyond D has no cells, and index 0.
 #[derive(Clone, Debug)]
@@ -60,17 +62,14 @@ impl Bodies {
 
     /// The nodes of a cell's functions; `None` unless all of these nodes are active.
     fn window(&self, cell: [i64; 3]) -> Option<Vec<u32>> {
-        let along = |k: usize| if k < self.dimension { self.pieces.window(cell[k], self.grid[k]) } else { 0..=0 };
-        let all = along(2).flat_map(|z| along(1).flat_map(move |y| along(0).map(move |x| [x, y, z])));
-        all.map(|node| self.numbers.get(&node).copied()).collect()
+        let along = |k| if k < self.dimension { self.pieces.window(cell[k], self.grid[k]) } else { 0..=0 };
+        in_box([0, 1, 2].map(along)).map(|node| self.numbers.get(&node).copied()).collect()
     }
 
     /// The occupied cells at most `reach` cells away along every axis, including the cell itself.
     fn around(&self, cell: [i64; 3], reach: i64) -> impl Iterator<Item = usize> {
-        let dimension = self.dimension;
-        let range = move |k: usize| if k < dimension { -reach..=reach } else { 0..=0 };
-        let all = range(2).flat_map(move |z| range(1).flat_map(move |y| range(0).map(move |x| [x, y, z])));
-        all.filter_map(move |by| self.places.get(&[0, 1, 2].map(|k| cell[k] + by[k])).copied())
+        let along = |k| if k < self.dimension { cell[k] - reach..=cell[k] + reach } else { 0..=0 };
+        in_box([0, 1, 2].map(along)).filter_map(|at| self.places.get(&at).copied())
     }
 
     /// Finds the connected pieces: cells that share a corner belong to one piece.
@@ -147,21 +146,23 @@ impl Bodies {
     pub(super) fn row(&self, node: [u32; 3], cells: &[usize]) -> BTreeMap<u32, f64> {
         let mut row = BTreeMap::new();
         for &cell in cells {
-            let along = |k: usize| match k < self.dimension {
+            let along = [0, 1, 2].map(|k| match k < self.dimension {
                 true => self.pieces.follow(self.cells[cell].0[k], self.grid[k], i64::from(node[k])),
                 false => vec![(0, 1.0)],
-            };
-            let [x, y, z] = [along(0), along(1), along(2)];
-            for &(k, of_z) in &z {
-                for &(j, of_y) in &y {
-                    for &(i, of_x) in &x {
-                        if let Some(&number) = self.numbers.get(&[i, j, k]) {
-                            *row.entry(number).or_insert(0.0) += of_x * of_y * of_z / cells.len() as f64;
-                        }
-                    }
+            });
+            for at in indices(along.each_ref().map(|list| list.len() as u64)) {
+                let [x, y, z] = std::array::from_fn(|k| along[k][at[k] as usize]);
+                if let Some(&number) = self.numbers.get(&[x.0, y.0, z.0]) {
+                    *row.entry(number).or_insert(0.0) += x.1 * y.1 * z.1 / cells.len() as f64;
                 }
             }
         }
         row
     }
+}
+
+/// The indices in a box, from its range along each axis.
+fn in_box(ranges: [RangeInclusive<i64>; 3]) -> impl Iterator<Item = [i64; 3]> {
+    let count = ranges.each_ref().map(|range| (range.end() - range.start() + 1).max(0) as u64);
+    indices(count).map(move |by| [0, 1, 2].map(|k| ranges[k].start() + by[k] as i64))
 }

@@ -27,7 +27,7 @@ pub use followers::Followers;
 pub use pieces::Pieces;
 
 use bodies::Bodies;
-use std::collections::{BTreeMap, HashSet};
+use std::collections::HashSet;
 
 /// The extension E in sparse rows: each outer node, the inner nodes that it follows, and their weights. E is the identity at all other
 /// nodes.
@@ -64,22 +64,19 @@ impl Extension {
             good.iter().flat_map(|&cell| bodies.windows[cell].iter().flatten().copied()).collect();
         let is_good: HashSet<usize> = good.into_iter().collect();
         let mut extension = Self { degree: pieces.degree, starts: vec![0], ..Self::default() };
-        for number in (0..occupied.nodes.len() as u32).filter(|number| !inner.contains(number)) {
-            let nearest = bodies.nearest(occupied.nodes[number as usize], &is_good);
-            if !nearest.is_empty() {
-                extension.push(number, bodies.row(occupied.nodes[number as usize], &nearest));
+        for (number, &node) in (0..).zip(occupied.nodes).filter(|(number, _)| !inner.contains(number)) {
+            let nearest = bodies.nearest(node, &is_good);
+            if nearest.is_empty() {
+                continue;
             }
+            extension.outer.push(number);
+            for (leader, weight) in bodies.row(node, &nearest).into_iter().filter(|(_, weight)| *weight != 0.0) {
+                extension.leaders.push(leader);
+                extension.weights.push(weight);
+            }
+            extension.starts.push(extension.leaders.len() as u32);
         }
         extension
-    }
-
-    fn push(&mut self, outer: u32, row: BTreeMap<u32, f64>) {
-        self.outer.push(outer);
-        for (leader, weight) in row.into_iter().filter(|(_, weight)| *weight != 0.0) {
-            self.leaders.push(leader);
-            self.weights.push(weight);
-        }
-        self.starts.push(self.leaders.len() as u32);
     }
 
     /// The degree of the functions, 1 to 3.

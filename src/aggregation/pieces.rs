@@ -22,9 +22,14 @@ impl Pieces {
     /// The pieces of linear functions, also used for functions that are not polynomials.
     pub const LINEAR: Self = Self { degree: 1, extension: 1, curves_at_walls: false, share: 0.5 };
 
+    /// Whether knots lie in the middle of grid cells, so that a knot cell is centred on a node.
+    fn is_even(self) -> bool {
+        self.degree.is_multiple_of(2)
+    }
+
     /// The knot cell at `local` spacings from the first node of an axis of `cells` cells.
     pub(crate) fn cell(self, local: f64, cells: u32) -> u32 {
-        if self.degree.is_multiple_of(2) { (local + 0.5) as u32 } else { (local as u32).min(cells.saturating_sub(1)) }
+        if self.is_even() { (local + 0.5) as u32 } else { (local as u32).min(cells.saturating_sub(1)) }
     }
 
     /// The knot cells that an interval along an axis overlaps, each with the fraction of the interval in that cell. `middle` and `length`
@@ -34,19 +39,19 @@ impl Pieces {
         if from >= to {
             return vec![(self.cell(middle, cells), 1.0)];
         }
-        let begin = |cell: u32| f64::from(cell) - if self.degree.is_multiple_of(2) { 0.5 } else { 0.0 };
+        let begin = |cell: u32| f64::from(cell) - if self.is_even() { 0.5 } else { 0.0 };
         let part = |cell: u32| (to.min(begin(cell + 1)) - from.max(begin(cell))).max(0.0) / (to - from);
         (self.cell(from, cells)..=self.cell(to, cells)).map(|cell| (cell, part(cell))).collect()
     }
 
     /// The fraction of a knot cell inside the grid, along an axis: a wall halves a knot cell of even degree.
     pub(crate) fn within(self, cell: u32, cells: u32) -> f64 {
-        if self.degree.is_multiple_of(2) && (cell == 0 || cell == cells) { 0.5 } else { 1.0 }
+        if self.is_even() && (cell == 0 || cell == cells) { 0.5 } else { 1.0 }
     }
 
     /// The centre of a cell, in half spacings.
     pub(super) fn centre(self, cell: i64) -> i64 {
-        if self.degree.is_multiple_of(2) { 2 * cell } else { 2 * cell + 1 }
+        if self.is_even() { 2 * cell } else { 2 * cell + 1 }
     }
 
     /// The nodes of a cell's functions along an axis of `cells` cells.
@@ -71,20 +76,13 @@ impl Pieces {
         if self.window(cell, cells).contains(&node) {
             return vec![(node, 1.0)];
         }
-        let coefficient = |at: i64| self.coefficient(cell, cells, at);
-        let scaled =
-            |factor: f64, list: Vec<(i64, f64)>| list.into_iter().map(move |(node, weight)| (node, factor * weight));
         if self.curves(cells) && (node == 0 || node == cells) {
             // The unknown of a wall node is the value there, not the coefficient.
-            let inwards = if node == 0 { 1 } else { -1 };
             let value = if self.degree == 2 { &VALUE_QUADRATIC[..] } else { &VALUE_CUBIC[..] };
-            return value
-                .iter()
-                .zip(0..)
-                .flat_map(|(&weight, k)| scaled(weight, coefficient(node + k * inwards)))
-                .collect();
+            let terms = inwards(node, value).map(|(at, weight)| (self.coefficient(cell, cells, at), weight));
+            return terms.flat_map(|(list, weight)| scaled(list, weight)).collect();
         }
-        coefficient(node)
+        self.coefficient(cell, cells, node)
     }
 
     /// The coefficient `at` = j of a cell's polynomial, by Lagrange's formula from the coefficients k in the window of the cell:
@@ -99,27 +97,33 @@ impl Pieces {
             let others = window.clone().filter(|&l| l != k);
             let weight: f64 = others.map(|l| (at - l) as f64 / (k - l) as f64).product();
             mutant!("unknowns: outer nodes follow by nine tenths": weight = 0.9 * weight);
-            list.extend(self.unknowns(k, cells).into_iter().map(|(node, factor)| (node, factor * weight)));
+            list.extend(scaled(self.unknowns(k, cells), weight));
         }
         list
     }
 
     /// The coefficient `k` in terms of unknowns. Beyond a wall u₋ₖ = 2u₀ − uₖ. Where functions curve, u₀ is the value at the wall.
     fn unknowns(self, k: i64, cells: i64) -> Vec<(i64, f64)> {
-        if self.curves(cells) {
+        let wall = k.clamp(0, cells);
+        if self.curves(cells) && (k == 0 || k == cells) {
             let own = if self.degree == 2 { &COEFFICIENT_QUADRATIC[..] } else { &COEFFICIENT_CUBIC[..] };
-            return match k {
-                0 => own.iter().zip(0..).map(|(&weight, node)| (node, weight)).collect(),
-                _ if k == cells => own.iter().zip(0..).map(|(&weight, node)| (cells - node, weight)).collect(),
-                _ => vec![(k, 1.0)],
-            };
-        }
-        match k {
-            _ if k < 0 => vec![(0, 2.0), (-k, -1.0)],
-            _ if k > cells => vec![(cells, 2.0), (2 * cells - k, -1.0)],
-            _ => vec![(k, 1.0)],
+            inwards(k, own).collect()
+        } else if k == wall {
+            vec![(k, 1.0)]
+        } else {
+            vec![(wall, 2.0), (2 * wall - k, -1.0)]
         }
     }
+}
+
+/// The nodes from a wall inwards, with these weights.
+fn inwards(wall: i64, weights: &[f64]) -> impl Iterator<Item = (i64, f64)> {
+    let step = if wall == 0 { 1 } else { -1 };
+    weights.iter().zip(0..).map(move |(&weight, k)| (wall + k * step, weight))
+}
+
+fn scaled(list: Vec<(i64, f64)>, factor: f64) -> impl Iterator<Item = (i64, f64)> {
+    list.into_iter().map(move |(node, weight)| (node, factor * weight))
 }
 
 /// The weights of c₀, c₁, … that give the value u₀ at a wall (`VALUE_…`), and the weights of u₀, c₁, … that give c₀

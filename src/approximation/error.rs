@@ -56,7 +56,7 @@ pub enum ApproximationError {
         /// The limit: γ̂ must be smaller.
         limit: f64,
     },
-    /// Neither Newton's method nor the derivative-free search found the Lagrange multipliers of max-ent.
+    /// Newton's method did not find the Lagrange multipliers of max-ent.
     #[error("max-ent with γ = {gamma} found no multipliers at {position:?}: Σ N (x - x_I) = {residual:e} h is left")]
     NoMultipliers {
         /// γ̂

@@ -1,12 +1,11 @@
 //! Uniform generalized interpolation (uGIMP).
 
-use super::interior::{InCells, InLanes, Rows, evaluate};
-use super::kernel::{Kernel, folded};
-use super::{ApproximationError, AtSurface, AxisWeights, Cells, Linear, Listed, Separable, Validate};
+use super::interior::InLanes;
+use super::kernel::{Kernel, folded, piecewise};
+use super::{ApproximationError, AtSurface, AxisWeights, Linear, Separable, Validate};
 use crate::aggregation::Pieces;
 use crate::grid::Axis;
 use crate::lanes::Lane;
-use crate::problems::Problems;
 
 /// The hat averaged over a particle of constant width 2 l_p: Bardenhagen & Kober, CMES 5 (2004).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,20 +34,6 @@ impl Gimp {
     }
 }
 
-impl Listed for Gimp {
-    type Parameters = ();
-    type Other = Self;
-    const ONE_HALF_WIDTH: bool = true;
-
-    fn build<A: From<Self> + From<Self::Other>>(_: &(), cells: Cells, _: &mut Problems, _: &str) -> Option<A> {
-        Some(Self::particles_per_axis(cells.particles_per_axis).into())
-    }
-
-    fn examples<A: From<Self> + From<Self::Other>>() -> Vec<(&'static str, A)> {
-        vec![("gimp", Self::particles_per_axis(2).into())]
-    }
-}
-
 impl Validate for Gimp {
     fn validate(&self, _dimension: usize) -> Result<(), ApproximationError> {
         let value = self.half_width;
@@ -61,6 +46,10 @@ impl Validate for Gimp {
 impl Kernel for Gimp {
     fn radius(&self) -> f64 {
         1.0 + self.half_width
+    }
+
+    fn edge(&self) -> f64 {
+        self.half_width
     }
 
     /// With d = |D| and l = l_p/h:
@@ -80,22 +69,7 @@ impl Kernel for Gimp {
         mutant!("shapes: the edge of the GIMP function is twice as high": far = (far.0 + far.0, far.1));
         let middle = (c(1.0) - d, c(0.0) - sign);
         let near = (c(1.0) - (d * d + c(l * l)) / c(2.0 * l), c(0.0) - distance / c(l));
-        let beyond = (d.where_less(c(1.0 - l), middle.0, far.0), d.where_less(c(1.0 - l), middle.1, far.1));
-        (d.where_less(c(l), near.0, beyond.0), d.where_less(c(l), near.1, beyond.1))
-    }
-}
-
-impl InLanes for Gimp {
-    fn radius(&self) -> f64 {
-        Kernel::radius(self)
-    }
-
-    fn edge(&self) -> f64 {
-        self.half_width
-    }
-
-    fn evaluate(&self, points: &InCells, out: Rows<'_>) -> usize {
-        evaluate::<1>(self, Kernel::radius(self), points, out)
+        piecewise(d, l, near, piecewise(d, 1.0 - l, middle, far))
     }
 }
 

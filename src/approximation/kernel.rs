@@ -1,18 +1,30 @@
 //! Kernels centred on the nodes. Ghost nodes beyond a wall are folded back to nodes of the grid.
 
 use super::error::ApproximationError;
-use super::interior::{Column, Interior, NODES, distance};
+use super::interior::{Column, InCells, InLanes, Interior, NODES, Rows, distance, evaluate};
 use super::product::{AxisWeights, Place};
 use crate::grid::Axis;
 use crate::lanes::Lane;
 
 /// A kernel D ↦ (φ, φ'), with lengths in units of the spacing.
-pub(super) trait Kernel {
+pub(super) trait Kernel: Sync {
     /// The distance beyond which φ = 0; at most 2.
     fn radius(&self) -> f64;
 
+    /// See [`InLanes::edge`].
+    fn edge(&self) -> f64 {
+        self.radius().fract()
+    }
+
     /// φ and φ'.
     fn at<T: Lane>(&self, distance: T) -> (T, T);
+}
+
+/// φ and φ' from those of two pieces: `near` for |D| < `knot`, `far` beyond.
+#[inline(always)]
+pub(super) fn piecewise<T: Lane>(distance: T, knot: f64, near: (T, T), far: (T, T)) -> (T, T) {
+    let knot = distance.constant(knot);
+    (distance.where_less(knot, near.0, far.0), distance.where_less(knot, near.1, far.1))
 }
 
 /// N_k = φ((x − x_k)/h).
@@ -32,33 +44,41 @@ pub(super) fn folded(
     // Nodes cell − lower … cell + upper have |D| < radius, ghosts included.
     let lower = (radius - place.below).ceil() as i64 - 1;
     let upper = (radius - place.above).ceil() as i64;
-    let (cell, last) = (i64::from(place.cell), axis.last());
+    let (cell, last) = (i64::from(place.cell), i64::from(axis.cells));
     let (first, end) = ((cell - lower).max(0), (cell + upper).min(last));
     out.start(first as u32);
-    for _ in first..=end {
-        out.push(0.0, 0.0);
-    }
+    (first..=end).for_each(|_| out.push(0.0, 0.0));
     let mut add = |node: i64, factor: f64, (value, slope): (f64, f64)| {
         let slot = (node - first) as usize;
         out.values[slot] += factor * value;
         out.derivatives[slot] += factor * slope / axis.spacing;
     };
     for node in cell - lower..=cell + upper {
-        let offset = node - cell;
-        let distance = if offset <= 0 { place.below - offset as f64 } else { -(place.above + (offset - 1) as f64) };
-        let at = kernel.at(distance);
-        if node < 0 {
-            add(0, 2.0, at);
-            mutant!("shapes: ghosts beyond a wall are folded back once": { add(0, -1.0, at); });
-            add(-node, -1.0, at);
-        } else if node > last {
-            add(last, 2.0, at);
-            add(2 * last - node, -1.0, at);
-        } else {
+        let at = kernel.at(place.distance(node));
+        let wall = node.clamp(0, last);
+        if node == wall {
             add(node, 1.0, at);
+        } else {
+            add(wall, 2.0, at);
+            mutant!("shapes: ghosts beyond a wall are folded back once": { if wall == 0 { add(0, -1.0, at); } });
+            add(2 * wall - node, -1.0, at);
         }
     }
     Ok(())
+}
+
+impl<K: Kernel> InLanes for K {
+    fn radius(&self) -> f64 {
+        Kernel::radius(self)
+    }
+
+    fn edge(&self) -> f64 {
+        Kernel::edge(self)
+    }
+
+    fn evaluate(&self, points: &InCells, out: Rows<'_>) -> usize {
+        evaluate::<1>(self, Kernel::radius(self), points, out)
+    }
 }
 
 impl<K: Kernel> Interior for K {

@@ -2,38 +2,21 @@
 
 use super::interior::{Column, InCells, InLanes, Interior, NODES, Rows, evaluate};
 use super::product::Place;
-use super::{ApproximationError, AxisWeights, Cells, Listed, Separable, Validate};
+use super::{ApproximationError, AxisWeights, Separable, Validate};
 use crate::aggregation::Pieces;
 use crate::grid::Axis;
 use crate::lanes::Lane;
-use crate::problems::Problems;
 
 /// Products of hat functions. On a cell face the gradient is that of the upper cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Linear;
-
-impl Listed for Linear {
-    type Parameters = ();
-    type Other = Self;
-
-    fn build<A: From<Self> + From<Self::Other>>(_: &(), _: Cells, _: &mut Problems, _: &str) -> Option<A> {
-        Some(Self.into())
-    }
-
-    fn examples<A: From<Self> + From<Self::Other>>() -> Vec<(&'static str, A)> {
-        vec![("linear", Self.into())]
-    }
-}
 
 impl Validate for Linear {}
 
 impl Separable for Linear {
     #[inline]
     fn axis(&self, axis: &Axis, x: f64, out: &mut AxisWeights) -> Result<(), ApproximationError> {
-        let place = Place::new(axis, x)?;
-        let Column { values, derivatives, .. } = self.column::<f64, 0>(place.below, place.above, 0.0, axis.spacing);
-        out.start(place.cell);
-        (0..2).for_each(|node| out.push(values[node], derivatives[node]));
+        out.hats(&Place::new(axis, x)?, axis.spacing);
         Ok(())
     }
 

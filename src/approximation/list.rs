@@ -1,11 +1,10 @@
-//! The list of families, which makes [`Approximation`] and [`Parameters`].
+//! The lists of families: [`Approximation`], the functions, and [`Parameters`], their keys in a scene.
 
 use super::bspline::{Bspline, BsplineParameters, NotAKnotBspline};
 use super::error::{ApproximationError, Validate};
 use super::gimp::Gimp;
 use super::linear::Linear;
-use super::listed::{Cells, Listed};
-use super::lme::{Lme, LmeCircle, LmeParameters};
+use super::lme::{Lme, LmeCircle, LmeParameters, LmeSupport};
 use super::product::Separable;
 use super::shape_function::{Scratch, ShapeFunction};
 use super::support::Support;
@@ -15,64 +14,15 @@ use crate::tensor::Vector;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Makes the types that contain every family from the list of families.
+/// Makes the type that contains every family from the list of families.
 macro_rules! approximations {
-    ($($(#[$sentence:meta])+ $key:literal => $family:ident $(($given:ident: $parameters:ty))? $(or $other:ident)?;)*) => {
+    ($($(#[$sentence:meta])+ $family:ident;)*) => {
         /// Any of the shipped shape functions.
         #[derive(Clone, Debug, PartialEq)]
         pub enum Approximation {
-            $($(#[$sentence])+ $family($family), $(#[doc = concat!("See [`", stringify!($other), "`].")] $other($other),)?)*
+            $($(#[$sentence])+ $family($family)),*
         }
 
-        /// The family of shape functions between particles and nodes.
-        #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
-        #[schemars(rename = "Approximation")]
-        pub enum Parameters {
-            $($(#[$sentence])+ #[serde(rename = $key)] $family $(($parameters))?),*
-        }
-
-        impl Parameters {
-            /// The key of the family.
-            pub(crate) fn key(&self) -> &'static str {
-                match self { $(Self::$family { .. } => $key),* }
-            }
-
-            /// Whether all bodies must have particles of one width.
-            pub(crate) fn one_half_width(&self) -> bool {
-                match self { $(Self::$family { .. } => $family::ONE_HALF_WIDTH),* }
-            }
-
-            /// Makes the functions. If keys below `path` are wrong, the result is `None` and `problems` lists them.
-            ///
-            /// ```
-            /// use bfree::approximation::{Gimp, Cells, Parameters};
-            /// use bfree::scene::Problems;
-            ///
-            /// let written: Parameters = serde_json::from_str(r#""gimp""#)?;
-            /// let cells = Cells { dimension: 2, particles_per_axis: 2, integrated: false };
-            /// let functions = written.functions(cells, &mut Problems::default(), "approximation");
-            /// assert_eq!(functions, Some(Gimp { half_width: 0.25 }.into()));
-            /// # Ok::<(), Box<dyn std::error::Error>>(())
-            /// ```
-            pub fn functions(&self, cells: Cells, problems: &mut Problems, path: &str) -> Option<Approximation> {
-                match self {
-                    $(Self::$family $(($given))? => {
-                        $family::build(&($(*$given)?), cells, problems, &format!("{path}.{}", $key))
-                    })*
-                }
-            }
-        }
-
-        impl Approximation {
-            /// Named members of every family, for tests and studies.
-            pub fn examples() -> Vec<(&'static str, Self)> {
-                [$($family::examples()),*].concat()
-            }
-        }
-
-        approximations!(@ $($family $($other)?)*);
-    };
-    (@ $($family:ident)*) => {
         impl Validate for Approximation {
             fn validate(&self, dimension: usize) -> Result<(), ApproximationError> {
                 match self { $(Self::$family(family) => family.validate(dimension)),* }
@@ -100,22 +50,114 @@ macro_rules! approximations {
     };
 }
 
-// The list of families. Each entry has the sentence of the manual, the key in scenes, the type, and a second type that the key may select.
 // CONTRIBUTING.md lists the other places that a shipped family touches.
 approximations! {
+    /// Products of hat functions.
+    Linear;
+    /// Products of one-dimensional uGIMP functions.
+    Gimp;
+    /// Products of B-splines centred on the nodes, whose second derivative is zero at walls.
+    Bspline;
+    /// Products of B-splines centred on the nodes, which may curve at walls.
+    NotAKnotBspline;
+    /// Local maximum entropy functions on a box of nodes.
+    Lme;
+    /// Local maximum entropy functions on a circle of nodes.
+    LmeCircle;
+}
+
+impl Approximation {
+    /// Named members of every family, for tests and studies. The widest max-ent functions, with γ̂ = 0.8, are on the box alone.
+    pub fn examples() -> Vec<(&'static str, Self)> {
+        vec![
+            ("linear", Linear.into()),
+            ("gimp", Gimp::particles_per_axis(2).into()),
+            ("quadratic", Bspline::Quadratic.into()),
+            ("cubic", Bspline::Cubic.into()),
+            ("not-a-knot quadratic", NotAKnotBspline(Bspline::Quadratic).into()),
+            ("not-a-knot cubic", NotAKnotBspline(Bspline::Cubic).into()),
+            ("lme 0.8", Lme::new(0.8, 1e-6).into()),
+            ("lme 1.8", Lme::new(1.8, 1e-6).into()),
+            ("lme 3", Lme::new(3.0, 1e-6).into()),
+            ("lme circle 1.8", LmeCircle::new(1.8, 1e-6).into()),
+            ("lme circle 3", LmeCircle::new(3.0, 1e-6).into()),
+        ]
+    }
+}
+
+/// The family of shape functions between particles and nodes.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[schemars(rename = "Approximation")]
+#[serde(rename_all = "snake_case")]
+pub enum Parameters {
     /// Products of hat functions. Simple and rough: forces jump when a particle crosses a cell face.
-    "linear" => Linear;
+    Linear,
     /// Products of one-dimensional uGIMP functions. The half-width of a particle follows from `particles_per_cell`, which must be equal for
     /// all bodies.
-    "gimp" => Gimp;
+    Gimp,
     /// Products of B-splines centred on the nodes. The splines may curve at walls if all particles are Gauss points on a grid that is not
     /// reset. In addition, no mass may be lumped (load steps, or `time.lumping` = 0). Otherwise the second derivative is zero at walls.
-    "bspline" => Bspline(given: BsplineParameters) or NotAKnotBspline;
+    Bspline(BsplineParameters),
     /// Local maximum entropy functions.
-    "lme" => Lme(given: LmeParameters) or LmeCircle;
+    Lme(LmeParameters),
+}
+
+/// The data of a scene on which shape functions depend, besides their own parameters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Cells {
+    /// The number of dimensions D.
+    pub dimension: usize,
+    /// Particles along each axis of a cell.
+    pub particles_per_axis: u32,
+    /// Whether the particles are Gauss points, so that sums over particles are integrals, and no mass is lumped.
+    pub integrated: bool,
 }
 
 impl Parameters {
+    /// The key of the family.
+    pub(crate) fn key(&self) -> &'static str {
+        match self {
+            Self::Linear => "linear",
+            Self::Gimp => "gimp",
+            Self::Bspline(_) => "bspline",
+            Self::Lme(_) => "lme",
+        }
+    }
+
+    /// Whether all bodies must have particles of one width.
+    pub(crate) fn one_half_width(&self) -> bool {
+        *self == Self::Gimp
+    }
+
+    /// Makes the functions. If keys below `path` are wrong, the result is `None` and `problems` lists them.
+    ///
+    /// ```
+    /// use bfree::approximation::{Gimp, Cells, Parameters};
+    /// use bfree::scene::Problems;
+    ///
+    /// let written: Parameters = serde_json::from_str(r#""gimp""#)?;
+    /// let cells = Cells { dimension: 2, particles_per_axis: 2, integrated: false };
+    /// let functions = written.functions(cells, &mut Problems::default(), "approximation");
+    /// assert_eq!(functions, Some(Gimp { half_width: 0.25 }.into()));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn functions(&self, cells: Cells, problems: &mut Problems, path: &str) -> Option<Approximation> {
+        let path = format!("{path}.{}", self.key());
+        Some(match self {
+            Self::Linear => Linear.into(),
+            Self::Gimp => Gimp::particles_per_axis(cells.particles_per_axis).into(),
+            Self::Bspline(given) => match given.spline(problems, &path)? {
+                spline if cells.integrated => NotAKnotBspline(spline).into(),
+                spline => spline.into(),
+            },
+            Self::Lme(given) if !given.check(cells.dimension, problems, &path) => return None,
+            Self::Lme(LmeParameters { gamma, tolerance, support }) => match support {
+                LmeSupport::Separable => Lme::new(*gamma, *tolerance).into(),
+                LmeSupport::Circle => LmeCircle::new(*gamma, *tolerance).into(),
+            },
+        })
+    }
+
     /// The polynomial degree of the functions along an axis. Local maximum-entropy functions have the degree of a comparable polynomial.
     pub(crate) fn degree(&self) -> u32 {
         match self {

@@ -1,5 +1,5 @@
-//! Shape functions N and ∇N. Each family has one file, with its functions and its keys in a scene ([`Listed`]). One list of the families
-//! makes [`Approximation`] and [`Parameters`].
+//! Shape functions N and ∇N. Each family has one file. [`Approximation`] is the list of the families, [`Parameters`] the list of their keys
+//! in a scene.
 //!
 //! Linear, GIMP, B-splines and the separable local max-ent functions (LME) are products of one-dimensional functions ([`Separable`]). These
 //! families share one tensor product. LME on the paper's circle of nodes is not a product. Positions and spacing are in the user's unit of
@@ -26,7 +26,6 @@ mod interior;
 mod kernel;
 mod linear;
 mod list;
-mod listed;
 mod lme;
 mod product;
 mod shape_function;
@@ -38,9 +37,8 @@ pub use gimp::Gimp;
 pub use interior::InLanes;
 pub(crate) use interior::{FURTHEST, InCells, Rows, SETTLED};
 pub use linear::Linear;
-pub use list::{Approximation, Parameters};
-pub use listed::{Cells, Listed};
-pub use lme::{Lme, LmeCircle, LmeParameters, LmeSupport, SMALLEST_TOLERANCE};
+pub use list::{Approximation, Cells, Parameters};
+pub use lme::{Lme, LmeCircle, LmeParameters, LmeSupport};
 pub use product::{AtSurface, AxisWeights, Separable};
 pub(crate) use product::{Place, check, list};
 pub use shape_function::{Scratch, ShapeFunction};

@@ -96,12 +96,6 @@ pub trait Separable: Validate + Send + Sync {
     fn pieces(&self) -> Pieces {
         Pieces::LINEAR
     }
-
-    /// Whether the functions are B-splines away from walls. Block-Jacobi is more effective for B-splines than for other functions of equal
-    /// width.
-    fn is_spline(&self) -> bool {
-        false
-    }
 }
 
 /// The functions at a point x of a loaded surface. Loads must act through functions that balance the internal force. Under uniform stress,
@@ -163,6 +157,13 @@ impl Place {
         // This difference is exact: s and the cell number agree in their leading digits.
         let below = s - f64::from(cell);
         Self { cell, below, above: 1.0 - below }
+    }
+
+    /// The signed distance D from a node of the axis, in spacings.
+    #[inline(always)]
+    pub(super) fn distance(&self, node: i64) -> f64 {
+        let offset = (node - i64::from(self.cell)) as f64;
+        if offset <= 0.0 { self.below - offset } else { -(self.above + (offset - 1.0)) }
     }
 
     /// The place, moved onto the edge of a support if only round-off separates them. Otherwise round-off would decide whether a node is

@@ -8,7 +8,7 @@ use crate::grid::{Grid, indices};
 use crate::mechanics::loads::CurveError;
 use crate::mechanics::reference::GridReset;
 use crate::particles::Particles;
-use crate::shape::{Facet, Filling, Layout, SURFACE_DEPTH, Shape, around, fill};
+use crate::shape::{Facet, Filling, GridBox, Layout, SURFACE_DEPTH, Shape, around, fill};
 use crate::simulation::Simulation;
 use crate::tensor::Vector;
 use indicatif::BinaryBytes;
@@ -149,9 +149,10 @@ impl<const D: usize> Builder<'_, D> {
             }
             for i in indices([n; D]) {
                 let lower = corner + Vector::from_fn(|k, _| i[k] as f64 * edges[k]);
+                let of = GridBox { lower, edges, spacing: h };
                 facets.extend(match filling.layout {
-                    Layout::Regular => shape.facets(region, &lower, &edges, h),
-                    Layout::Gauss => shape.surface_points(region, &lower, &edges, h),
+                    Layout::Regular => shape.facets(region, &of),
+                    Layout::Gauss => shape.surface_points(region, &of),
                 });
             }
         }
@@ -220,10 +221,10 @@ impl Scene {
     pub fn filled<const D: usize>(&self, simulation: &Simulation<D>) -> Vec<BodyUse> {
         let (grid, particles) = (&simulation.grid, &simulation.particles);
         let drawn = |shape: &super::shape::Shape| {
-            let (shape, edges) = (shape.build::<D>()?, Vector::repeat(grid.spacing));
+            let shape = shape.build::<D>()?;
             let (first, count) = around(grid, &shape);
-            let lower = |cell: [u64; D]| grid.position(std::array::from_fn(|k| (first[k] + cell[k]) as u32));
-            Some(indices(count).map(|cell| shape.part(&lower(cell), &edges, grid.spacing).0).sum::<f64>())
+            let cell = |i: [u64; D]| GridBox::cell(grid, std::array::from_fn(|k| (first[k] + i[k]) as u32));
+            Some(indices(count).map(|i| shape.part(&cell(i)).0).sum::<f64>())
         };
         let of = |(number, body): (usize, &Body)| {
             let is_own = |p: &usize| particles.body[*p] as usize == number && particles.is_solid(*p);

@@ -6,7 +6,7 @@ use super::{BodyUse, Scene};
 use crate::grid::{Grid, indices};
 use crate::material::{Law, Material, poissons_ratio};
 use crate::mechanics::loads::SurfaceLoad;
-use crate::shape::{EDGE, Fill, Intersection, Shape, around};
+use crate::shape::{EDGE, Fill, GridBox, Intersection, Shape, around};
 use crate::simulation::Simulation;
 use crate::tensor::{Deformation, Tensor, Vector};
 use std::collections::BTreeSet;
@@ -139,8 +139,7 @@ impl<const D: usize> Bodies<'_, D> {
         let volume: f64 = match (&self.shapes[a], &self.shapes[b]) {
             (Some(one), Some(other)) => {
                 let common = Shape::from(Intersection(vec![one.clone(), other.clone()]));
-                let edges = Vector::repeat(grid.spacing);
-                cells.iter().map(|&cell| common.part(&grid.position(cell), &edges, grid.spacing).0).sum()
+                cells.iter().map(|&cell| common.part(&GridBox::cell(grid, cell)).0).sum()
             }
             _ => found.iter().map(|&p| particles.volume[p]).sum(),
         };

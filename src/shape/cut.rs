@@ -1,7 +1,7 @@
 //! Cut cells: the volume and the centroid of the part of a box in a solid, and the surface in the box. A box is halved until the surface in
 //! it is nearly flat. Planes then cut the box into simplices, exactly.
 
-use super::{EDGE, Face, Shape};
+use super::{Face, GridBox, Shape};
 use crate::tensor::{Tensor, Vector, determinant};
 
 /// The largest distance between a surface and the planes that approximate it, relative to the spacing. A ball two spacings in radius is
@@ -99,12 +99,12 @@ impl<const D: usize> Cut<D> {
     }
 
     /// The simplices of a box, cut by all planes.
-    fn simplices(&self, lower: &Vector<f64, D>, edges: &Vector<f64, D>, round_off: f64) -> Vec<Simplex<D>> {
-        let mut simplices = simplices_of_box(lower, edges);
+    fn simplices(&self, of: &GridBox<D>) -> Vec<Simplex<D>> {
+        let mut simplices = simplices_of_box(of);
         for plane in &self.planes {
             let mut parts = Vec::new();
             for simplex in simplices {
-                split(simplex, &|x| self.distance(plane, x), round_off, &mut parts);
+                split(simplex, &|x| self.distance(plane, x), of.round_off(), &mut parts);
             }
             simplices = parts;
         }
@@ -113,86 +113,64 @@ impl<const D: usize> Cut<D> {
 }
 
 impl<const D: usize> Shape<D> {
-    /// The volume and the centroid of the part of the solid in a box on a grid of this spacing. The box begins at `lower` and has these
-    /// `edges`. If all faces are flat, the result is exact up to round-off. Otherwise the error across the surface is about 1e-3 `spacing`.
+    /// The volume and the centroid of the part of the solid in a box. If all faces are flat, the result is exact up to round-off. Otherwise
+    /// the error across the surface is about 1e-3 spacings.
     ///
     /// ```
-    /// use bfree::shape::{HalfSpace, Shape};
+    /// use bfree::shape::{GridBox, HalfSpace, Shape};
     /// use bfree::tensor::Vector;
     ///
     /// // Half of a square, a triangle.
     /// let below = Shape::from(HalfSpace { point: Vector::zeros(), normal: Vector::from([1.0, 1.0]) });
-    /// let (volume, centroid) = below.part(&Vector::from([-3.0, 0.0]), &Vector::from([3.0, 3.0]), 1.0);
+    /// let square = GridBox { lower: Vector::from([-3.0, 0.0]), edges: Vector::from([3.0, 3.0]), spacing: 1.0 };
+    /// let (volume, centroid) = below.part(&square);
     /// assert!((volume - 4.5).abs() < 1e-14 && (centroid - Vector::from([-2.0, 1.0])).norm() < 1e-14);
     /// ```
-    pub fn part(&self, lower: &Vector<f64, D>, edges: &Vector<f64, D>, spacing: f64) -> (f64, Vector<f64, D>) {
-        if let Some(one) = self.row(lower, edges, 1).and_then(|row| row.into_iter().next()) {
-            return one;
+    pub fn part(&self, of: &GridBox<D>) -> (f64, Vector<f64, D>) {
+        if let Some([part]) = self.solid().row(of, 1).as_deref() {
+            return *part;
         }
-        let (center, radius) = around(lower, edges);
+        let (center, radius) = of.around();
         if let Some((part, outside)) = self.solid().alone(&center, radius) {
-            let (volume, centroid) = part.part(lower, edges, spacing);
+            let (volume, centroid) = part.part(of);
             if !outside {
                 return (volume, centroid);
             }
-            let rest = edges.product() - volume;
+            let rest = of.edges.product() - volume;
             return (rest.max(0.0), if rest > 0.0 { center + (center - centroid) * (volume / rest) } else { center });
         }
         let (mut volume, mut moment) = (0.0, Vector::zeros());
-        self.pieces(None, lower, edges, spacing, FLAT, &mut |piece, _| {
+        self.pieces(None, of, FLAT, &mut |piece, _| {
             volume += piece.volume;
             moment += piece.centroid * piece.volume;
         });
-        (volume, if volume > 0.0 { moment / volume } else { lower + edges * 0.5 })
+        (volume, if volume > 0.0 { moment / volume } else { center })
     }
 
-    /// The parts of `count` boxes next to each other along the first axis, as by [`Self::part`]. The first box begins at `lower`. `None`
-    /// for a shape that cannot compute all boxes at once.
-    pub(super) fn row(
-        &self,
-        lower: &Vector<f64, D>,
-        edges: &Vector<f64, D>,
-        count: usize,
-    ) -> Option<Vec<(f64, Vector<f64, D>)>> {
-        self.solid().row(lower, edges, count)
-    }
-
-    /// The surface in the box of [`Self::part`], and in `region` if given: one facet for each side of the solid there.
+    /// The surface in a box, and in `region` if given: one facet for each side of the solid there. Errors are those of [`Self::part`].
     ///
     /// ```
-    /// use bfree::shape::{Ball, Shape};
+    /// use bfree::shape::{Ball, GridBox, Shape};
     /// use bfree::tensor::Vector;
     ///
     /// // Half of a circle. Its normals sum up to that of its diameter.
     /// let disc = Shape::from(Ball { center: Vector::zeros(), radius: 1.0 });
-    /// let facets = disc.facets(None, &Vector::from([0.0, -2.0]), &Vector::from([2.0, 4.0]), 0.5);
+    /// let right = GridBox { lower: Vector::from([0.0, -2.0]), edges: Vector::from([2.0, 4.0]), spacing: 0.5 };
+    /// let facets = disc.facets(None, &right);
     /// let arc: f64 = facets.iter().map(|facet| facet.area).sum();
     /// assert!((arc / std::f64::consts::PI - 1.0).abs() < 1e-3);
     /// let normal: Vector<f64, 2> = facets.iter().map(|facet| facet.normal * facet.area).sum();
     /// assert!((normal - Vector::from([2.0, 0.0])).norm() < 2e-3);
     /// ```
-    pub fn facets(
-        &self,
-        region: Option<&Self>,
-        lower: &Vector<f64, D>,
-        edges: &Vector<f64, D>,
-        spacing: f64,
-    ) -> Vec<Facet<D>> {
-        self.sides(region, lower, edges, spacing, FLAT)
+    pub fn facets(&self, region: Option<&Self>, of: &GridBox<D>) -> Vec<Facet<D>> {
+        self.sides(region, of, FLAT)
     }
 
     /// The facets of [`Self::facets`], with the tolerance `flat` in place of 1e-3.
-    pub(super) fn sides(
-        &self,
-        region: Option<&Self>,
-        lower: &Vector<f64, D>,
-        edges: &Vector<f64, D>,
-        spacing: f64,
-        flat: f64,
-    ) -> Vec<Facet<D>> {
-        let (center, radius) = around(lower, edges);
+    pub(super) fn sides(&self, region: Option<&Self>, of: &GridBox<D>, flat: f64) -> Vec<Facet<D>> {
+        let (center, radius) = of.around();
         if let Some((part, outside)) = self.solid().alone(&center, radius) {
-            let mut facets = part.sides(region, lower, edges, spacing, flat);
+            let mut facets = part.sides(region, of, flat);
             for facet in facets.iter_mut().filter(|_| outside) {
                 (facet.normal, facet.turn) = (-facet.normal, -facet.turn);
             }
@@ -200,25 +178,24 @@ impl<const D: usize> Shape<D> {
         }
         let mut sides: Vec<Facet<D>> = Vec::new();
         let mut add = |facet: Facet<D>, departure: f64| {
-            let slack = departure + EDGE * spacing;
+            let slack = departure + of.round_off();
             if region.is_some_and(|region| region.signed_distance(&facet.position) > slack) {
                 return;
             }
             let side = |side: &&mut Facet<D>| side.normal.dot(&facet.normal) > SAME_SIDE * side.normal.norm();
-            let Some(side) = sides.iter_mut().find(side) else {
-                sides.push(facet);
-                return;
-            };
-            *side = side.and(&facet);
+            match sides.iter_mut().find(side) {
+                Some(side) => *side = side.and(&facet),
+                None => sides.push(facet),
+            }
         };
         let mut planes = Vec::new();
-        region.iter().for_each(|region| _ = region.solid().add_planes(&center, radius, &mut planes));
-        if let Some(facets) = self.solid().facets(lower, edges, &planes) {
+        region.inspect(|region| _ = region.solid().add_planes(&center, radius, &mut planes));
+        if let Some(facets) = self.solid().facets(of, &planes) {
             facets.into_iter().for_each(|facet| add(facet, 0.0));
             return sides;
         }
-        self.pieces(region, lower, edges, spacing, flat, &mut |piece, cut| {
-            for end in self.ends(&piece, cut, spacing) {
+        self.pieces(region, of, flat, &mut |piece, cut| {
+            for end in self.ends(&piece, cut, of.round_off()) {
                 add(Facet::flat(&end.corners, end.outward, end.area), end.departure);
             }
         });
@@ -226,14 +203,13 @@ impl<const D: usize> Shape<D> {
     }
 
     /// The sides of a piece that lie on the surface of the solid.
-    pub(super) fn ends(&self, piece: &Piece<D>, cut: Option<&Cut<D>>, spacing: f64) -> Vec<End<D>> {
+    pub(super) fn ends(&self, piece: &Piece<D>, cut: Option<&Cut<D>>, round_off: f64) -> Vec<End<D>> {
         let (Extent::Simplex(simplex), Some(cut)) = (&piece.extent, cut) else { return Vec::new() };
-        (0..=D).filter_map(|apex| self.end(simplex, apex, piece.volume, cut, spacing)).collect()
+        (0..=D).filter_map(|apex| self.end(simplex, apex, piece.volume, cut, round_off)).collect()
     }
 
     /// The side of a simplex opposite the corner `apex`, if this side lies on the surface of the solid.
-    fn end(&self, simplex: &Simplex<D>, apex: usize, volume: f64, cut: &Cut<D>, spacing: f64) -> Option<End<D>> {
-        let round_off = EDGE * spacing;
+    fn end(&self, simplex: &Simplex<D>, apex: usize, volume: f64, cut: &Cut<D>, round_off: f64) -> Option<End<D>> {
         let mut corners = simplex[..=D].to_vec();
         corners.swap_remove(apex);
         let height = |plane: &Face<D>| cut.distance(plane, &simplex[apex]);
@@ -264,23 +240,21 @@ impl<const D: usize> Shape<D> {
     }
 
     /// Visits the convex pieces of the intersection of a box and the solid, with the planes that cut them. The planes of `region` cut the
-    /// pieces once more. Edges may be negative; the box then lies below `lower`.
+    /// pieces once more. Edges may be negative; the box then lies below its corner `lower`.
     pub(super) fn pieces(
         &self,
         region: Option<&Self>,
-        lower: &Vector<f64, D>,
-        edges: &Vector<f64, D>,
-        spacing: f64,
+        of: &GridBox<D>,
         flat: f64,
         visit: &mut dyn FnMut(Piece<D>, Option<&Cut<D>>),
     ) {
-        let (center, radius) = around(lower, edges);
+        let (center, radius) = of.around();
         let distance = self.signed_distance(&center);
         if distance >= radius {
             return;
         }
         if distance <= -radius {
-            visit(Piece { volume: edges.product().abs(), centroid: center, extent: Extent::Box(*edges) }, None);
+            visit(Piece { volume: of.edges.product().abs(), centroid: center, extent: Extent::Box(of.edges) }, None);
             return;
         }
         let mut planes = Vec::new();
@@ -288,18 +262,15 @@ impl<const D: usize> Shape<D> {
         for shape in std::iter::once(self).chain(region) {
             departure = departure.max(shape.solid().add_planes(&center, radius, &mut planes));
         }
-        let round_off = EDGE * spacing;
-        let planes = distinct(planes, radius, round_off);
-        let is_flat = departure <= flat * spacing && !may_be_confused(&planes, departure) && planes.len() <= MAX_PLANES;
+        let planes = distinct(planes, radius, of.round_off());
+        let is_flat =
+            departure <= flat * of.spacing && !may_be_confused(&planes, departure) && planes.len() <= MAX_PLANES;
         mutant!("solids: a curved surface by one plane a box": is_flat = planes.len() <= MAX_PLANES);
-        if !is_flat && radius > flat * spacing {
-            for (lower, edges) in halves(lower, edges) {
-                self.pieces(region, &lower, &edges, spacing, flat, visit);
-            }
-            return;
+        if !is_flat && radius > flat * of.spacing {
+            return of.halves().iter().for_each(|half| self.pieces(region, half, flat, visit));
         }
         let cut = Cut { center, planes, departure: departure.min(2.0 * radius) };
-        for simplex in cut.simplices(lower, edges, round_off) {
+        for simplex in cut.simplices(of) {
             let volume = volume(&simplex);
             let centroid = simplex[..=D].iter().sum::<Vector<f64, D>>() / (D + 1) as f64;
             if volume > 0.0 && self.holds_by(&cut, &centroid) {
@@ -334,33 +305,18 @@ fn may_be_confused<const D: usize>(planes: &[Face<D>], departure: f64) -> bool {
     planes.iter().enumerate().any(|(i, a)| planes[..i].iter().any(|b| close(a, b)))
 }
 
-/// The two halves of a box across its longest edge: the lower corner and the edges of each.
-fn halves<const D: usize>(lower: &Vector<f64, D>, edges: &Vector<f64, D>) -> [(Vector<f64, D>, Vector<f64, D>); 2] {
-    let k = edges.iamax();
-    let mut half = *edges;
-    half[k] *= 0.5;
-    let mut middle = *lower;
-    middle[k] += half[k];
-    [(*lower, half), (middle, half)]
-}
-
-/// The centre of a box, and the distance of its corners from the centre. A small margin includes faces that the box only touches.
-pub(super) fn around<const D: usize>(lower: &Vector<f64, D>, edges: &Vector<f64, D>) -> (Vector<f64, D>, f64) {
-    (lower + edges * 0.5, (0.5 + EDGE) * edges.norm())
-}
-
 /// The D! simplices of a box (Kuhn). Each simplex leads from the lower corner to the upper corner, one axis at a time.
-fn simplices_of_box<const D: usize>(lower: &Vector<f64, D>, edges: &Vector<f64, D>) -> Vec<Simplex<D>> {
+fn simplices_of_box<const D: usize>(of: &GridBox<D>) -> Vec<Simplex<D>> {
     let orders: &[[usize; 3]] = match D {
         1 => &[[0, 0, 0]],
         2 => &[[0, 1, 0], [1, 0, 0]],
         _ => &[[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]],
     };
     let walk = |order: &[usize; 3]| {
-        let mut simplex = [*lower; 4];
+        let mut simplex = [of.lower; 4];
         for i in 0..D {
             simplex[i + 1] = simplex[i];
-            simplex[i + 1][order[i]] += edges[order[i]];
+            simplex[i + 1][order[i]] += of.edges[order[i]];
         }
         simplex
     };

@@ -3,7 +3,7 @@
 use super::layout::{Points, between_middles};
 use super::quadrature::THIN_PART;
 use super::seeds::{Seed, Seeds};
-use super::{EDGE, Layout, Shape};
+use super::{EDGE, GridBox, Layout, Part, Shape};
 use crate::grid::{Grid, indices};
 use crate::tensor::Vector;
 use schemars::JsonSchema;
@@ -141,13 +141,9 @@ pub fn fill<const D: usize>(grid: &Grid<D>, shape: &Shape<D>, how: Filling) -> R
     let mut row = None;
     for (id, cell) in (0..).zip(indices(count)) {
         if how.rule == Fill::Cut && cell[0] == 0 {
-            row = filler.boxes_of_row(cell);
+            row = filler.row(cell);
         }
-        let content = filler.content(cell, row.as_deref());
-        if how.rule == Fill::Cut && !matches!(content, Content::Nothing) {
-            seeds.begin_cell(id);
-        }
-        match content {
+        match filler.content(cell, row.as_deref()) {
             Content::Nothing => {}
             Content::Whole => filler.fill_whole(id, cell, &mut seeds),
             Content::Parts(parts) => filler.fill_parts(id, cell, parts, &mut seeds),
@@ -185,14 +181,9 @@ struct Filler<'a, const D: usize> {
     points: [Points; 4],
     /// Whether each cell is full; empty if the points of a cell do not depend on its neighbours.
     full: Vec<bool>,
-    /// The point along an axis of a box with one particle.
-    middle: Points,
     /// The points along an axis of a box with Gauss points.
     gauss: Points,
 }
-
-/// The volume and the centroid of the part of a box in the shape.
-type Part<const D: usize> = (f64, Vector<f64, D>);
 
 /// The content of a cell.
 enum Content<'a, const D: usize> {
@@ -203,42 +194,23 @@ enum Content<'a, const D: usize> {
 
 /// The parts of a cut cell.
 struct Parts<'a, const D: usize> {
-    /// The particles in each box of the cell.
-    boxes: Vec<Vec<Seed<D>>>,
     /// The number of boxes along an axis.
     along: u32,
-    /// The volume of a box.
-    box_volume: f64,
+    /// The filled fraction of each box, and the particles in it.
+    boxes: Vec<(f64, Vec<Seed<D>>)>,
     /// Positions and weights along an axis of a full box.
     full: &'a [(f64, f64)],
     /// A part below this fraction of a box is a sliver.
     sliver: f64,
 }
 
-impl<const D: usize> Parts<'_, D> {
-    /// The fraction of a box that its particles fill.
-    fn share(&self, part: &[Seed<D>]) -> f64 {
-        part.iter().map(|seed| seed.volume).sum::<f64>() / self.box_volume
-    }
-}
-
-impl<'a, const D: usize> Content<'a, D> {
-    /// The parts of a cell, or a whole cell if all its boxes are full.
-    fn of(parts: Parts<'a, D>) -> Self {
-        let is_cut = parts.boxes.iter().any(|part| parts.share(part) < 1.0 - VOLUME_ROUND_OFF);
-        if is_cut { Self::Parts(parts) } else { Self::Whole }
-    }
-}
-
 impl<'a, const D: usize> Filler<'a, D> {
     fn new(grid: &'a Grid<D>, shape: &'a Shape<D>, how: Filling, first: [u64; D], count: [u64; D]) -> Self {
         let between = how.pieces() > 1;
-        let points = [[false, false], [true, false], [false, true], [true, true]].map(|is_full| {
-            if between { between_middles(how.per_axis, is_full) } else { how.layout.points(how.per_axis) }
-        });
-        let middle = Layout::Regular.points(1);
         let gauss = how.layout.points(how.per_axis);
-        let mut filler = Self { grid, shape, how, first, count, points, full: Vec::new(), middle, gauss };
+        let points = [[false, false], [true, false], [false, true], [true, true]]
+            .map(|is_full| if between { between_middles(how.per_axis, is_full) } else { gauss.clone() });
+        let mut filler = Self { grid, shape, how, first, count, points, full: Vec::new(), gauss };
         if between {
             filler.full = indices(count).map(|cell| filler.is_full(cell)).collect();
         }
@@ -251,52 +223,41 @@ impl<'a, const D: usize> Filler<'a, D> {
         Vector::from_fn(|k, _| self.grid.origin[k] + (corner[k] + within[k]) * self.grid.spacing)
     }
 
-    /// The lower corners of `n` boxes along each axis of a cell.
-    fn lower_corners(&self, cell: [u64; D], n: u32) -> impl Iterator<Item = Vector<f64, D>> {
-        indices([u64::from(n); D]).map(move |i| self.position(cell, Vector::from_fn(|k, _| i[k] as f64 / f64::from(n))))
-    }
-
-    /// The edge of a box, with `n` boxes along each axis of a cell.
-    fn edge(&self, n: u32) -> f64 {
-        self.grid.spacing / f64::from(n)
-    }
-
-    /// The quadrature points of a piece of a cell, if there are any.
-    fn quadrature(&self, lower: &Vector<f64, D>, degree: u32) -> Option<Vec<Seed<D>>> {
-        let edges = Vector::repeat(self.edge(self.how.pieces()));
-        self.shape.quadrature(lower, &edges, self.grid.spacing, degree, self.how.per_axis)
+    /// The boxes of a cell, `n` along each axis.
+    fn boxes(&self, cell: [u64; D], n: u32) -> impl Iterator<Item = GridBox<D>> {
+        let (spacing, n_f) = (self.grid.spacing, f64::from(n));
+        indices([u64::from(n); D]).map(move |i| {
+            let lower = self.position(cell, Vector::from_fn(|k, _| i[k] as f64 / n_f));
+            GridBox { lower, edges: Vector::repeat(spacing / n_f), spacing }
+        })
     }
 
     /// Whether the shape contains a cell. Each piece is measured as in [`Self::parts`]: neighbouring cells must agree on which of them is
     /// full.
     fn is_full(&self, cell: [u64; D]) -> bool {
-        let edges: Vector<f64, D> = Vector::repeat(self.edge(self.how.pieces()));
-        let volume = |lower: Vector<f64, D>| match self.quadrature(&lower, 0) {
-            Some(points) => points.iter().map(|point| point.volume).sum(),
-            None => self.shape.part(&lower, &edges, self.grid.spacing).0,
-        };
-        let mut volumes = self.lower_corners(cell, self.how.pieces()).map(volume);
-        volumes.all(|volume| volume >= (1.0 - VOLUME_ROUND_OFF) * edges.product())
+        self.boxes(cell, self.how.pieces()).all(|piece| {
+            let volume = match self.shape.quadrature(&piece, 0, self.how.per_axis) {
+                Some(points) => points.iter().map(|point| point.volume).sum(),
+                None => self.shape.part(&piece).0,
+            };
+            volume >= (1.0 - VOLUME_ROUND_OFF) * piece.edges.product()
+        })
     }
 
-    /// The volume and the centroid of the shape in the boxes of a row of cells, if the shape computes them all at once. The boxes are in
-    /// rows along the first axis.
-    fn boxes_of_row(&self, first: [u64; D]) -> Option<Vec<Vec<Part<D>>>> {
-        let boxes = self.how.boxes();
-        let edges = Vector::repeat(self.edge(boxes));
-        let along = self.count[0] as usize * boxes as usize;
-        let starts = self.lower_corners(first, boxes).step_by(boxes as usize);
-        starts.map(|lower| self.shape.row(&lower, &edges, along)).collect()
+    /// The parts of the boxes of a row of cells, if the shape computes them all at once. The boxes are in rows along the first axis.
+    fn row(&self, first: [u64; D]) -> Option<Vec<Vec<Part<D>>>> {
+        let boxes = self.how.boxes() as usize;
+        let starts = self.boxes(first, self.how.boxes()).step_by(boxes);
+        starts.map(|start| self.shape.solid().row(&start, self.count[0] as usize * boxes)).collect()
     }
 
     /// The content of a cell. `row` has the boxes of its row of cells, if the shape computes them all at once.
     fn content(&self, cell: [u64; D], row: Option<&[Vec<Part<D>>]>) -> Content<'_, D> {
         if let Some(row) = row {
             let boxes = self.how.boxes() as usize;
-            let of_cell = row.iter().flat_map(|row| row.iter().skip(cell[0] as usize * boxes).take(boxes));
-            let of_cell: Vec<_> = of_cell.copied().collect();
-            let is_empty = of_cell.iter().all(|(volume, _)| *volume <= 0.0);
-            return if is_empty { Content::Nothing } else { Content::of(self.parts_with_one_particle(of_cell)) };
+            let of_cell = row.iter().flat_map(|row| &row[cell[0] as usize * boxes..][..boxes]);
+            let is_empty = of_cell.clone().all(|part| part.0 <= 0.0);
+            return if is_empty { Content::Nothing } else { self.with_one_particle(of_cell.copied()) };
         }
         let h = self.grid.spacing;
         let distance = self.shape.signed_distance(&self.position(cell, Vector::repeat(0.5)));
@@ -305,74 +266,64 @@ impl<'a, const D: usize> Filler<'a, D> {
             Fill::Particles => Content::Whole,
             Fill::Cells if distance <= EDGE * h => Content::Whole,
             Fill::Cut if distance <= -half_diagonal => Content::Whole,
-            Fill::Cut if distance < half_diagonal => Content::of(self.parts(cell)),
+            Fill::Cut if distance < half_diagonal => self.parts(cell),
             Fill::Cells | Fill::Cut => Content::Nothing,
         }
     }
 
-    /// The parts of a cell at the surface: quadrature points in Gauss layout, if there are any, or one particle in each box.
-    fn parts(&self, cell: [u64; D]) -> Parts<'_, D> {
+    /// The content of a cell at the surface: quadrature points in Gauss layout, if there are any, or one particle in each box.
+    fn parts(&self, cell: [u64; D]) -> Content<'_, D> {
         if self.how.layout == Layout::Gauss {
-            let pieces = self.how.pieces();
-            let corners = self.lower_corners(cell, pieces);
-            let points: Option<Vec<_>> = corners.map(|lower| self.quadrature(&lower, self.how.degree)).collect();
-            if let Some(boxes) = points {
-                let box_volume = self.edge(pieces).powi(D as i32);
-                return Parts { boxes, along: pieces, box_volume, full: &self.gauss, sliver: THIN_PART };
+            let points = |piece| self.shape.quadrature(&piece, self.how.degree, self.how.per_axis);
+            let boxes: Option<Vec<_>> = self.boxes(cell, self.how.pieces()).map(points).collect();
+            if let Some(boxes) = boxes {
+                return self.unless_whole(self.how.pieces(), boxes.into_iter(), &self.gauss, THIN_PART);
             }
         }
-        let boxes = self.how.boxes();
-        let edges = Vector::repeat(self.edge(boxes));
-        let corners = self.lower_corners(cell, boxes);
-        let parts = corners.map(|lower| self.shape.part(&lower, &edges, self.grid.spacing));
-        self.parts_with_one_particle(parts.collect())
+        self.with_one_particle(self.boxes(cell, self.how.boxes()).map(|of| self.shape.part(&of)))
     }
 
-    /// The parts of a cell with one particle in each box, from the volume and the centroid in each box.
-    fn parts_with_one_particle(&self, boxes: Vec<Part<D>>) -> Parts<'_, D> {
-        let along = self.how.boxes();
-        let one = |(volume, position): Part<D>| vec![Seed { position, volume }];
-        Parts {
-            boxes: boxes.into_iter().map(one).collect(),
-            along,
-            box_volume: self.edge(along).powi(D as i32),
-            full: &self.middle,
-            sliver: SLIVER,
-        }
+    /// The content of a cell with one particle in each box.
+    fn with_one_particle(&self, boxes: impl Iterator<Item = Part<D>>) -> Content<'_, D> {
+        let seeds = boxes.map(|(volume, position)| vec![Seed { position, volume }]);
+        self.unless_whole(self.how.boxes(), seeds, &[(0.5, 1.0)], SLIVER)
+    }
+
+    /// The parts of a cell, or a whole cell if all its boxes are full.
+    fn unless_whole<'b>(
+        &self,
+        along: u32,
+        boxes: impl Iterator<Item = Vec<Seed<D>>>,
+        full: &'b [(f64, f64)],
+        sliver: f64,
+    ) -> Content<'b, D> {
+        let box_volume = (self.grid.spacing / f64::from(along)).powi(D as i32);
+        let share = |part: &[Seed<D>]| part.iter().map(|seed| seed.volume).sum::<f64>() / box_volume;
+        let boxes: Vec<_> = boxes.map(|part| (share(&part), part)).collect();
+        let is_cut = boxes.iter().any(|(share, _)| *share < 1.0 - VOLUME_ROUND_OFF);
+        if is_cut { Content::Parts(Parts { along, boxes, full, sliver }) } else { Content::Whole }
     }
 
     /// Adds the particles of a whole cell.
     fn fill_whole(&self, id: u64, cell: [u64; D], seeds: &mut Seeds<D>) {
-        let h = self.grid.spacing;
-        let along = self.points_of_cell(id, cell);
-        for i in indices(along.map(|points| points.len() as u64)) {
-            let position = self.position(cell, Vector::from_fn(|k, _| along[k][i[k] as usize].0));
-            if self.how.rule != Fill::Particles || self.shape.holds(&position, h) {
-                let volume = (0..D).map(|k| along[k][i[k] as usize].1 * h).product();
-                seeds.add(Seed { position, volume });
-            }
-        }
-    }
-
-    /// The points along each axis of a whole cell.
-    fn points_of_cell(&self, id: u64, cell: [u64; D]) -> [&[(f64, f64)]; D] {
+        seeds.begin_cell(id);
         let is_full = |beside: Option<u64>| beside.and_then(|id| self.full.get(id as usize)).is_some_and(|&full| full);
         let mut stride = 1;
-        std::array::from_fn(|k| {
+        let along = std::array::from_fn(|k| {
             let below = (cell[k] > 0).then(|| id - stride);
             let above = (cell[k] + 1 < self.count[k]).then(|| id + stride);
             stride *= self.count[k];
             self.points[usize::from(is_full(below)) + 2 * usize::from(is_full(above))].as_slice()
-        })
+        });
+        self.fill_box(cell, [0; D], 1, along, seeds);
     }
 
     /// Adds the particles of a cut cell.
-    fn fill_parts(&self, id: u64, cell: [u64; D], mut parts: Parts<'_, D>, seeds: &mut Seeds<D>) {
-        let boxes = std::mem::take(&mut parts.boxes);
-        for (i, part) in indices([u64::from(parts.along); D]).zip(boxes) {
-            let share = parts.share(&part);
+    fn fill_parts(&self, id: u64, cell: [u64; D], parts: Parts<'_, D>, seeds: &mut Seeds<D>) {
+        seeds.begin_cell(id);
+        for (i, (share, part)) in indices([u64::from(parts.along); D]).zip(parts.boxes) {
             if share > 1.0 - VOLUME_ROUND_OFF {
-                self.fill_box(cell, i, &parts, seeds);
+                self.fill_box(cell, i, parts.along, [parts.full; D], seeds);
             } else if share > VOLUME_ROUND_OFF {
                 mutant!("solids: slivers are left alone": { seeds.add_part(id, part, false); continue; });
                 seeds.add_part(id, part, share < parts.sliver);
@@ -380,14 +331,15 @@ impl<'a, const D: usize> Filler<'a, D> {
         }
     }
 
-    /// Adds the particles of a full box of a cut cell.
-    fn fill_box(&self, cell: [u64; D], i: [u64; D], parts: &Parts<'_, D>, seeds: &mut Seeds<D>) {
-        let edge = self.edge(parts.along);
-        for j in indices([parts.full.len() as u64; D]) {
-            let along: [(f64, f64); D] = std::array::from_fn(|k| parts.full[j[k] as usize]);
-            let within = Vector::from_fn(|k, _| (i[k] as f64 + along[k].0) / f64::from(parts.along));
-            let volume = along.iter().map(|(_, weight)| weight * edge).product();
-            seeds.add(Seed { position: self.position(cell, within), volume });
+    /// Adds the particles of box `i` of a cell with `n` boxes along each axis, at the points of a rule along each axis.
+    fn fill_box(&self, cell: [u64; D], i: [u64; D], n: u32, rules: [&[(f64, f64)]; D], seeds: &mut Seeds<D>) {
+        let (h, n) = (self.grid.spacing, f64::from(n));
+        for j in indices(rules.map(|points| points.len() as u64)) {
+            let along: [(f64, f64); D] = std::array::from_fn(|k| rules[k][j[k] as usize]);
+            let position = self.position(cell, Vector::from_fn(|k, _| (i[k] as f64 + along[k].0) / n));
+            if self.how.rule != Fill::Particles || self.shape.holds(&position, h) {
+                seeds.add(Seed { position, volume: along.iter().map(|(_, weight)| weight * (h / n)).product() });
+            }
         }
     }
 }

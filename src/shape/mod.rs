@@ -2,10 +2,12 @@
 
 mod ball;
 mod block;
+mod bounds;
 mod combined;
 mod cone;
 mod cut;
 mod fill;
+mod grid_box;
 mod half_space;
 mod layout;
 mod moments;
@@ -26,6 +28,7 @@ pub use cone::Cone;
 pub use cut::Facet;
 pub(crate) use fill::around;
 pub use fill::{Fill, FillError, Filling, MAX_CANDIDATES, fill};
+pub use grid_box::GridBox;
 pub use half_space::HalfSpace;
 pub use layout::Layout;
 pub use pixels::{Mask, Pixels};
@@ -45,6 +48,9 @@ pub(crate) const SURFACE_DEPTH: f64 = 1e-6;
 /// A piece of surface: its signed distance d, negative inside, and its outward unit normal n = ∇d.
 type Face<const D: usize> = (f64, Vector<f64, D>);
 
+/// The volume and the centroid of the part of a box in a solid.
+type Part<const D: usize> = (f64, Vector<f64, D>);
+
 /// The geometry that every solid provides.
 trait Solid<const D: usize> {
     /// The surface nearest to `x`.
@@ -63,18 +69,12 @@ trait Solid<const D: usize> {
     }
 
     /// The facets of the surface in a box; `None` for a solid whose surface is approximated by planes.
-    fn facets(&self, _lower: &Vector<f64, D>, _edges: &Vector<f64, D>, _planes: &[Face<D>]) -> Option<Vec<Facet<D>>> {
+    fn facets(&self, _of: &GridBox<D>, _planes: &[Face<D>]) -> Option<Vec<Facet<D>>> {
         None
     }
 
-    /// Volume and centroid of the solid in each of `count` boxes next to each other along the first axis. The first box begins at `lower`,
-    /// and all boxes have these `edges`. `None` for a solid that planes cut.
-    fn row(
-        &self,
-        _lower: &Vector<f64, D>,
-        _edges: &Vector<f64, D>,
-        _count: usize,
-    ) -> Option<Vec<(f64, Vector<f64, D>)>> {
+    /// The parts of the solid in `count` equal boxes next to each other along the first axis. `None` for a solid that planes cut.
+    fn row(&self, _first: &GridBox<D>, _count: usize) -> Option<Vec<Part<D>>> {
         None
     }
 }

@@ -2,8 +2,9 @@
 //! part and over the gaps between their planes and the surface.
 
 use super::Seed;
+use super::bounds::Bounds;
 use super::cut::{Extent, Piece};
-use super::layout::{Layout, Points};
+use super::layout::Layout;
 use crate::grid::indices;
 use crate::solver::NonnegativeLeastSquares;
 use crate::tensor::Vector;
@@ -19,17 +20,9 @@ const MOMENT_TOLERANCE: f64 = 1e-10;
 const CANDIDATES_PER_POLYNOMIAL: [usize; 4] = [4, 16, 64, 256];
 
 impl<const D: usize> Piece<D> {
-    /// The Gauss points in the piece.
-    fn points(&self, rules: &Rules) -> Vec<Seed<D>> {
-        match &self.extent {
-            Extent::Box(_) => self.in_box(&rules.of_box),
-            Extent::Simplex(simplex) => in_simplex(&simplex[..=D], self.volume, &rules.of_simplex),
-        }
-    }
-
     /// The points of a rule along each axis of the bounding box of the piece.
     pub(super) fn in_box(&self, along: &[(f64, f64)]) -> Vec<Seed<D>> {
-        let [low, high] = self.bounds();
+        let Bounds(low, high) = self.bounds();
         let point = |i: [u64; D]| {
             let at = i.map(|i| along[i as usize]);
             let position = Vector::from_fn(|k, _| self.centroid[k] + (at[k].0 - 0.5) * (high[k] - low[k]));
@@ -48,48 +41,20 @@ impl<const D: usize> Piece<D> {
         }
     }
 
-    /// The bounding box of the piece.
-    fn bounds(&self) -> [Vector<f64, D>; 2] {
+    fn bounds(&self) -> Bounds<D> {
         match &self.extent {
-            Extent::Box(edges) => [self.centroid - edges.abs() * 0.5, self.centroid + edges.abs() * 0.5],
-            Extent::Simplex(simplex) => {
-                [Vector::inf, Vector::sup].map(|bound: fn(&Vector<f64, D>, &Vector<f64, D>) -> _| {
-                    simplex[1..=D].iter().fold(simplex[0], |all, corner| bound(&all, corner))
-                })
-            }
+            Extent::Box(edges) => Bounds(self.centroid - edges.abs() * 0.5, self.centroid + edges.abs() * 0.5),
+            Extent::Simplex(simplex) => Bounds::of(simplex[..=D].iter().copied()),
         }
     }
 }
 
-/// The bounding box of some pieces.
-fn bounds<const D: usize>(pieces: &[Piece<D>]) -> [Vector<f64, D>; 2] {
-    let nothing: [Vector<f64, D>; 2] = [f64::INFINITY, f64::NEG_INFINITY].map(Vector::repeat);
-    let around =
-        |[low, high]: [Vector<f64, D>; 2], [lower, upper]: [Vector<f64, D>; 2]| [low.inf(&lower), high.sup(&upper)];
-    pieces.iter().map(Piece::bounds).fold(nothing, around)
-}
-
 /// The box that these pieces fill, if they fill one. Pieces do not overlap, so they fill their bounding box if they have its volume.
 pub(super) fn whole_box<const D: usize>(pieces: &[Piece<D>]) -> Option<Piece<D>> {
-    let [low, high] = bounds(pieces);
+    let Bounds(low, high) = Bounds::around(pieces.iter().map(Piece::bounds));
     let (edges, volume) = (high - low, pieces.iter().map(|piece| piece.volume).sum::<f64>());
     let fills = (edges.product() - volume).abs() <= MOMENT_TOLERANCE * volume;
     fills.then(|| Piece { volume: edges.product(), centroid: (low + high) * 0.5, extent: Extent::Box(edges) })
-}
-
-/// Gauss rules along an axis of a piece, for products of polynomials of a degree p.
-struct Rules {
-    of_box: Points,
-    of_simplex: Points,
-}
-
-impl Rules {
-    fn new<const D: usize>(degree: u32) -> Self {
-        // In a simplex the products have total degree D p, and the map from a cube adds D − 1 along one axis.
-        let [of_box, of_simplex] =
-            [degree / 2 + 1, (D as u32 * (degree + 1)).div_ceil(2)].map(|n| Layout::Gauss.points(n));
-        Self { of_box, of_simplex }
-    }
 }
 
 /// Points in the simplex with d + 1 corners and this measure, by a rule along each of d axes.
@@ -123,8 +88,8 @@ pub(super) struct Legendre<const D: usize> {
 }
 
 impl<const D: usize> Legendre<D> {
-    pub(super) fn new(around: &[Piece<D>], degree: u32) -> Self {
-        let [low, high] = bounds(around);
+    pub(super) fn new(pieces: &[Piece<D>], degree: u32) -> Self {
+        let Bounds(low, high) = Bounds::around(pieces.iter().map(Piece::bounds));
         Self { middle: (low + high) * 0.5, half: (high - low) * 0.5, degree }
     }
 
@@ -162,9 +127,17 @@ impl<const D: usize> Legendre<D> {
 
     /// The integrals of the products over the pieces and the gaps.
     pub(super) fn moments(&self, pieces: &[Piece<D>], gaps: &[Seed<D>]) -> DVector<f64> {
+        // In a simplex the products have total degree D p, and the map from a cube adds D − 1 along one axis.
+        let [of_box, of_simplex] =
+            [self.degree / 2 + 1, (D as u32 * (self.degree + 1)).div_ceil(2)].map(|n| Layout::Gauss.points(n));
         let mut moments = DVector::zeros(self.count());
-        let rules = Rules::new::<D>(self.degree);
-        pieces.iter().for_each(|piece| self.add_moments(&piece.points(&rules), &mut moments));
+        for piece in pieces {
+            let points = match &piece.extent {
+                Extent::Box(_) => piece.in_box(&of_box),
+                Extent::Simplex(simplex) => in_simplex(&simplex[..=D], piece.volume, &of_simplex),
+            };
+            self.add_moments(&points, &mut moments);
+        }
         self.add_moments(gaps, &mut moments);
         moments
     }
@@ -178,11 +151,10 @@ pub(super) fn few<const D: usize>(pieces: &[Piece<D>], gaps: &[Seed<D>], degree:
     let volume = moments[0];
     let mut problem = NonnegativeLeastSquares::new(moments);
     // The cumulative volume of the pieces.
-    let sum = |sum: &mut f64, piece: &Piece<D>| {
-        *sum += piece.volume;
-        Some(*sum)
-    };
-    let up_to: Vec<f64> = pieces.iter().scan(0.0, sum).collect();
+    let mut up_to: Vec<f64> = Vec::with_capacity(pieces.len());
+    for piece in pieces {
+        up_to.push(up_to.last().unwrap_or(&0.0) + piece.volume);
+    }
     // Weyl's sequence fills the pieces evenly.
     let place = |k: usize| {
         let u = |root: f64| (root.sqrt() * (k + 1) as f64).fract();

@@ -1,6 +1,7 @@
 //! Solids of pixels (voxels in 3D), from pictures and scans. Each pixel is a box that belongs to the solid or does not.
 
-use super::{Face, Solid, axis};
+use super::{Face, GridBox, Part, Solid, axis};
+use crate::grid::indices;
 use crate::tensor::Vector;
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -14,12 +15,9 @@ const PLANES: usize = 6;
 
 /// The pixels that belong to a solid; in 2D they are one layer of voxels. Clones share the pixels.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Mask(Arc<Pyramid>);
-
-/// The pixels, groups of 2ᴰ pixels, groups of groups, up to a single group.
-#[derive(Debug, PartialEq)]
-struct Pyramid {
-    levels: Vec<Level>,
+pub struct Mask {
+    /// The pixels, groups of 2ᴰ pixels, groups of groups, up to a single group.
+    levels: Arc<[Level]>,
     /// The first and the last pixel along each axis that belong to the solid.
     bounds: [[usize; 2]; 3],
 }
@@ -72,36 +70,27 @@ impl Mask {
             return None;
         }
         let mut bounds = [[usize::MAX, 0]; 3];
-        for (i, _) in flags.iter().enumerate().filter(|(_, flag)| **flag == IN) {
-            let place = [i % count[0], i / count[0] % count[1], i / count[0] / count[1]];
-            for (bounds, at) in bounds.iter_mut().zip(place) {
-                *bounds = [bounds[0].min(at), bounds[1].max(at)];
-            }
+        for (at, _) in indices(count.map(|n| n as u64)).zip(&flags).filter(|(_, flag)| **flag == IN) {
+            bounds = [0, 1, 2].map(|k| [bounds[k][0].min(at[k] as usize), bounds[k][1].max(at[k] as usize)]);
         }
         if bounds[0][0] > bounds[0][1] {
             return None;
         }
-        let mut levels = vec![Level { count, flags }];
-        while let Some(coarser) = levels.last().filter(|level| level.flags.len() > 1).map(Level::coarser) {
-            levels.push(coarser);
-        }
-        Some(Self(Arc::new(Pyramid { levels, bounds })))
+        let coarser = |level: &Level| (level.flags.len() > 1).then(|| level.coarser());
+        let levels = std::iter::successors(Some(Level { count, flags }), coarser).collect();
+        Some(Self { levels, bounds })
     }
 
     fn count(&self) -> [usize; 3] {
-        self.0.levels[0].count
+        self.levels[0].count
     }
 
     /// Whether a pixel belongs to the solid; pixels beyond the picture do not.
     fn holds<const D: usize>(&self, pixel: &[i64; D]) -> bool {
-        let mut place = [0; 3];
-        for (k, (&at, place)) in pixel.iter().zip(&mut place).enumerate() {
-            match usize::try_from(at) {
-                Ok(at) if at < self.count()[k] => *place = at,
-                _ => return false,
-            }
-        }
-        self.0.levels[0].at(place) == IN
+        let count = self.count();
+        let is_in_picture = (0..D).all(|k| (0..count[k] as i64).contains(&pixel[k]));
+        let place = || std::array::from_fn(|k| pixel.get(k).map_or(0, |&at| at as usize));
+        is_in_picture && self.levels[0].at(place()) == IN
     }
 }
 
@@ -109,7 +98,7 @@ impl<const D: usize> Pixels<D> {
     /// The solid of a mask that covers the box from `min` to `max`. `None` in 1D, and in 2D if the mask has more than one layer.
     ///
     /// ```
-    /// use bfree::shape::{Mask, Pixels, Shape};
+    /// use bfree::shape::{GridBox, Mask, Pixels, Shape};
     /// use bfree::tensor::Vector;
     ///
     /// // An L of three squares.
@@ -117,8 +106,9 @@ impl<const D: usize> Pixels<D> {
     /// let corner = Shape::from(Pixels::<2>::new(Vector::zeros(), Vector::from([2.0, 2.0]), mask).ok_or("plane")?);
     /// assert_eq!(corner.signed_distance(&Vector::from([1.5, 1.25])), 0.25);
     /// assert_eq!(corner.normal(&Vector::from([1.5, 0.75])), Vector::from([0.0, 1.0]));
-    /// // What of a box lies in it.
-    /// let (volume, centroid) = corner.part(&Vector::from([0.5, 0.5]), &Vector::from([1.0, 1.0]), 1.0);
+    /// // The part of it in a box.
+    /// let square = GridBox { lower: Vector::from([0.5, 0.5]), edges: Vector::from([1.0, 1.0]), spacing: 1.0 };
+    /// let (volume, centroid) = corner.part(&square);
     /// assert_eq!((volume, centroid), (0.75, Vector::from([2.75 / 3.0, 2.75 / 3.0])));
     /// # Ok::<(), &str>(())
     /// ```
@@ -152,7 +142,7 @@ impl<const D: usize> Pixels<D> {
 
     /// Searches a group for the `wanted` pixel nearest to `x`, and keeps that pixel if it is nearer than `found`.
     fn search(&self, x: &Vector<f64, D>, wanted: u8, level: usize, group: [usize; 3], found: &mut Found<D>) {
-        let here = &self.mask.0.levels[level];
+        let here = &self.mask.levels[level];
         if here.at(group) & wanted == 0 {
             return;
         }
@@ -169,7 +159,7 @@ impl<const D: usize> Pixels<D> {
             return;
         }
         // Search the half that contains x, or is nearer to x, first.
-        let (finer, mut near) = (self.mask.0.levels[level - 1].count, [0_usize; 3]);
+        let (finer, mut near) = (self.mask.levels[level - 1].count, [0_usize; 3]);
         for k in 0..D {
             near[k] = usize::from(x[k] >= self.face(k, ((2 * group[k] + 1) << (level - 1)) as f64));
         }
@@ -196,16 +186,17 @@ impl<const D: usize> Solid<D> for Pixels<D> {
         let mut found = Found { squared: f64::INFINITY, foot: *x, center: *x };
         if inside {
             // Everything around the picture is outside.
-            for (k, sign) in (0..D).flat_map(|k| [(k, -1.0), (k, 1.0)]) {
+            let ends = |k: usize| [(k, 0.0, -1.0), (k, self.mask.count()[k] as f64, 1.0)];
+            for (k, end, sign) in (0..D).flat_map(ends) {
                 let mut foot = *x;
-                foot[k] = self.face(k, if sign > 0.0 { self.mask.count()[k] as f64 } else { 0.0 });
+                foot[k] = self.face(k, end);
                 let squared = (x - foot).norm_squared();
                 if squared < found.squared {
                     found = Found { squared, foot, center: foot + axis(k, 0.5 * sign * self.edges[k]) };
                 }
             }
         }
-        self.search(x, if inside { OUT } else { IN }, self.mask.0.levels.len() - 1, [0; 3], &mut found);
+        self.search(x, if inside { OUT } else { IN }, self.mask.levels.len() - 1, [0; 3], &mut found);
         let (distance, sign) = (found.squared.sqrt(), if inside { -1.0 } else { 1.0 });
         let away = (x - found.foot) * sign;
         if distance > 0.0 {
@@ -222,7 +213,7 @@ impl<const D: usize> Solid<D> for Pixels<D> {
         let first: [i64; D] = std::array::from_fn(|k| self.pixel(k, x[k] - radius) - 1);
         let count: [u64; D] = std::array::from_fn(|k| (self.pixel(k, x[k] + radius) - first[k] + 1) as u64);
         let mut near = BTreeSet::new();
-        for within in crate::grid::indices(count) {
+        for within in indices(count) {
             let pixel: [i64; D] = std::array::from_fn(|k| first[k] + within[k] as i64);
             let inside = self.mask.holds(&pixel);
             for k in 0..D {
@@ -252,20 +243,21 @@ impl<const D: usize> Solid<D> for Pixels<D> {
 
     fn reach(&self, n: &Vector<f64, D>) -> f64 {
         let along = |k: usize| {
-            let [first, last] = self.mask.0.bounds[k];
+            let [first, last] = self.mask.bounds[k];
             (n[k] * self.face(k, first as f64)).max(n[k] * self.face(k, (last + 1) as f64))
         };
         (0..D).map(along).sum()
     }
 
     /// Sums over the inside pixels: volume and first moment of the overlap of a pixel and a box.
-    fn row(&self, lower: &Vector<f64, D>, edges: &Vector<f64, D>, count: usize) -> Option<Vec<(f64, Vector<f64, D>)>> {
-        let mut across = [const { Vec::new() }; 2];
-        for (k, overlaps) in (1..).zip(&mut across) {
-            let layer = || vec![(0, 1.0, 0.0)];
-            *overlaps = if k < D { self.overlaps(k, lower[k], lower[k] + edges[k]) } else { layer() };
-        }
-        let level = &self.mask.0.levels[0];
+    fn row(&self, first: &GridBox<D>, count: usize) -> Option<Vec<Part<D>>> {
+        let GridBox { lower, edges, .. } = first;
+        // A picture in 2D is one layer of voxels.
+        let across = [1, 2].map(|k| match k < D {
+            true => self.overlaps(k, lower[k], lower[k] + edges[k]),
+            false => vec![(0, 1.0, 0.0)],
+        });
+        let level = &self.mask.levels[0];
         let of_box = |number: usize| {
             let from = lower[0] + number as f64 * edges[0];
             let along = self.overlaps(0, from, from + edges[0]);

@@ -39,7 +39,7 @@ impl PolygonError {
                                edges that meet at the vertex they share and nowhere else (vertices are counted from 0)";
 
     /// The vertex to name for this error, if there is one.
-    pub fn vertex(&self) -> Option<usize> {
+    pub(crate) fn vertex(&self) -> Option<usize> {
         match self {
             Self::Dimension(_) | Self::TooFew(_) | Self::Flat => None,
             Self::Repeated(vertex, _) | Self::Meeting([vertex, _], _) => Some(*vertex),
@@ -74,28 +74,21 @@ impl<const D: usize> Polygon<D> {
         if n < 3 {
             return Err(PolygonError::TooFew(n));
         }
-        let from_first = vertices.iter().map(|x| x - vertices[0]);
-        let diameter =
-            from_first.clone().fold(
-                Vector::zeros(),
-                |far: Vector<f64, D>, x| {
-                    if x.norm_squared() > far.norm_squared() { x } else { far }
-                },
-            );
+        let from_first = || vertices.iter().map(|x| x - vertices[0]);
+        let further =
+            |far: Vector<f64, D>, x: Vector<f64, D>| if x.norm_squared() > far.norm_squared() { x } else { far };
+        let diameter = from_first().fold(Vector::zeros(), further);
         let tolerance = MEETING_DISTANCE * diameter.norm();
-        for i in 0..n {
-            if let Some(k) = (0..i).find(|&k| (vertices[i] - vertices[k]).norm() <= tolerance) {
-                return Err(PolygonError::Repeated(i, k));
-            }
+        let pairs = || (0..n).flat_map(|i| (0..i).map(move |k| (i, k)));
+        if let Some((i, k)) = pairs().find(|&(i, k)| (vertices[i] - vertices[k]).norm() <= tolerance) {
+            return Err(PolygonError::Repeated(i, k));
         }
-        if !from_first.clone().any(|x| cross(&diameter, &x).abs() > tolerance * diameter.norm()) {
+        if !from_first().any(|x| cross(&diameter, &x).abs() > tolerance * diameter.norm()) {
             return Err(PolygonError::Flat);
         }
         let edge = |i: usize| [i, (i + 1) % n];
-        for i in 0..n {
-            if let Some(k) = (0..i).find(|&k| meet(&vertices, edge(i), edge(k), tolerance)) {
-                return Err(PolygonError::Meeting(edge(i), edge(k)));
-            }
+        if let Some((i, k)) = pairs().find(|&(i, k)| meet(&vertices, edge(i), edge(k), tolerance)) {
+            return Err(PolygonError::Meeting(edge(i), edge(k)));
         }
         Ok(Self::oriented(vertices))
     }
@@ -108,11 +101,6 @@ impl<const D: usize> Polygon<D> {
             vertices.reverse();
         }
         Self { vertices }
-    }
-
-    /// Its vertices, counter-clockwise.
-    pub fn vertices(&self) -> &[Vector<f64, D>] {
-        &self.vertices
     }
 
     /// The ends of edge i.
@@ -195,14 +183,14 @@ fn meet<const D: usize>(vertices: &[Vector<f64, D>], one: [usize; 2], other: [us
     if (0..D).any(|k| a[k].min(b[k]) > c[k].max(d[k]) + tolerance || c[k].min(d[k]) > a[k].max(b[k]) + tolerance) {
         return false;
     }
-    let apart = |a: &Vector<f64, D>, b: &Vector<f64, D>, c: &Vector<f64, D>, d: &Vector<f64, D>| {
-        let (left, right) = (cross(&(b - a), &(c - a)), cross(&(b - a), &(d - a)));
+    let parts = |[a, b]: [&Vector<f64, D>; 2], ends: [&Vector<f64, D>; 2]| {
+        let [left, right] = ends.map(|x| cross(&(b - a), &(x - a)));
         (left < 0.0 && right > 0.0) || (left > 0.0 && right < 0.0)
     };
-    let touches = |end: usize, edge: [usize; 2]| {
+    let touches = |edge: [usize; 2], end: usize| {
         !edge.contains(&end) && (vertices[end] - foot(&vertices[end], ends(edge)).1).norm() <= tolerance
     };
-    (apart(a, b, c, d) && apart(c, d, a, b))
-        || one.into_iter().any(|end| touches(end, other))
-        || other.into_iter().any(|end| touches(end, one))
+    (parts([a, b], [c, d]) && parts([c, d], [a, b]))
+        || one.into_iter().any(|end| touches(other, end))
+        || other.into_iter().any(|end| touches(one, end))
 }

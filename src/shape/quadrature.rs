@@ -6,9 +6,9 @@
 //! moments exist at no more points than there are products (Tchakaloff's theorem; Davis, Math. Comput. 21, 1967). Non-negative least
 //! squares finds these volumes. In each box, a surface has D points with the centroid and the second moments of the surface.
 
-use super::cut::{End, Facet, Piece, around};
+use super::cut::{End, Facet, Piece};
 use super::moments::{few, in_simplex, whole_box};
-use super::{EDGE, Layout, Seed, Shape};
+use super::{GridBox, Layout, Seed, Shape};
 use crate::grid::indices;
 use crate::tensor::{Tensor, Vector};
 
@@ -31,69 +31,52 @@ impl<const D: usize> Shape<D> {
     ///
     /// A thin part has one point. A part that is itself a box has Gauss points: `per_axis` along an axis, or as many as the degree needs.
     /// `None` for surfaces of triangles, of which only volumes and centroids are known, and if no such points are found.
-    pub(super) fn quadrature(
-        &self,
-        lower: &Vector<f64, D>,
-        edges: &Vector<f64, D>,
-        spacing: f64,
-        degree: u32,
-        per_axis: u32,
-    ) -> Option<Vec<Seed<D>>> {
-        if !self.has_planes(lower, edges) {
+    pub(super) fn quadrature(&self, of: &GridBox<D>, degree: u32, per_axis: u32) -> Option<Vec<Seed<D>>> {
+        if !self.has_planes(of) {
             return None;
         }
-        let (pieces, gaps) = self.pieces_and_gaps(lower, edges, spacing);
-        let sum = |volume: f64, piece: &Piece<D>| volume + piece.volume;
-        let (flat, gap) = (pieces.iter().fold(0.0, sum), gaps.iter().map(|gap| gap.volume).sum::<f64>());
-        if flat + gap >= THIN_PART * edges.product() {
-            return match whole_box(&pieces).filter(|_| gaps.is_empty()) {
-                Some(part) => Some(part.in_box(&Layout::Gauss.points(per_axis.max(degree / 2 + 1)))),
-                None => few(&pieces, &gaps, degree),
-            };
+        let (pieces, gaps) = self.pieces_and_gaps(of);
+        let flat: f64 = pieces.iter().map(|piece| piece.volume).sum();
+        let volume = flat + gaps.iter().map(|gap| gap.volume).sum::<f64>();
+        if volume < THIN_PART * of.edges.product() {
+            // A thin part has one point, which the caller joins to a neighbour.
+            let moment: Vector<f64, D> = pieces.iter().map(|piece| piece.centroid * piece.volume).sum();
+            let has_volume = flat > 0.0 && volume > 0.0;
+            return Some(if has_volume { vec![Seed { position: moment / flat, volume }] } else { Vec::new() });
         }
-        // A thin part has one point, which the caller joins to a neighbour.
-        let moment: Vector<f64, D> = pieces.iter().map(|piece| piece.centroid * piece.volume).sum();
-        Some(
-            (flat > 0.0 && flat + gap > 0.0)
-                .then(|| Seed { position: moment / flat, volume: flat + gap })
-                .into_iter()
-                .collect(),
-        )
+        match whole_box(&pieces).filter(|_| gaps.is_empty()) {
+            Some(part) => Some(part.in_box(&Layout::Gauss.points(per_axis.max(degree / 2 + 1)))),
+            None => few(&pieces, &gaps, degree),
+        }
     }
 
     /// The pieces of the solid in a box, and points of the gaps between their planes and the surface. The box begins at the corner that is
     /// deepest in the solid, so a mirrored solid has mirrored pieces.
-    fn pieces_and_gaps(
-        &self,
-        lower: &Vector<f64, D>,
-        edges: &Vector<f64, D>,
-        spacing: f64,
-    ) -> (Vec<Piece<D>>, Vec<Seed<D>>) {
+    fn pieces_and_gaps(&self, of: &GridBox<D>) -> (Vec<Piece<D>>, Vec<Seed<D>>) {
         let rise = |i: [u64; D]| {
             let at: Vector<f64, D> = Vector::from_fn(|k, _| i[k] as f64);
-            at.add_scalar(-0.5) * self.signed_distance(&(lower + edges.component_mul(&at)))
+            at.add_scalar(-0.5) * self.signed_distance(&(of.lower + of.edges.component_mul(&at)))
         };
         let rise: Vector<f64, D> = indices([2; D]).map(rise).sum();
-        let (mut corner, mut edges) = (*lower, *edges);
-        for k in (0..D).filter(|&k| rise[k] < -EDGE * spacing) {
-            corner[k] += edges[k];
-            edges[k] = -edges[k];
+        let mut from_deepest = *of;
+        for k in (0..D).filter(|&k| rise[k] < -of.round_off()) {
+            from_deepest.lower[k] += of.edges[k];
+            from_deepest.edges[k] = -of.edges[k];
         }
         let rule = Layout::Gauss.points(GAP_POINTS);
         let (mut pieces, mut gaps) = (Vec::new(), Vec::new());
-        self.pieces(None, &corner, &edges, spacing, FLAT_FOR_PARTICLES, &mut |piece, cut| {
-            self.ends(&piece, cut, spacing).iter().for_each(|end| self.add_gap(end, &rule, spacing, &mut gaps));
+        self.pieces(None, &from_deepest, FLAT_FOR_PARTICLES, &mut |piece, cut| {
+            for end in self.ends(&piece, cut, of.round_off()).iter().filter(|end| end.departure > of.round_off()) {
+                self.add_gap(end, &rule, &mut gaps);
+            }
             pieces.push(piece);
         });
         (pieces, gaps)
     }
 
     /// Points between a plane and the surface that it approximates. Volumes are negative where the surface lies below the plane.
-    fn add_gap(&self, end: &End<D>, rule: &[(f64, f64)], spacing: f64, points: &mut Vec<Seed<D>>) {
+    fn add_gap(&self, end: &End<D>, rule: &[(f64, f64)], points: &mut Vec<Seed<D>>) {
         mutant!("solids: the gap between planes and a curved surface is left out": { return; });
-        if end.departure <= EDGE * spacing {
-            return;
-        }
         for foot in in_simplex(&end.corners, end.area, rule) {
             let height = self.height(&foot.position, end);
             for (u, weight) in rule {
@@ -122,34 +105,29 @@ impl<const D: usize> Shape<D> {
     /// those of [`Fill::Cut`](super::Fill) in Gauss layout.
     ///
     /// ```
-    /// use bfree::shape::{HalfSpace, Shape};
+    /// use bfree::shape::{GridBox, HalfSpace, Shape};
     /// use bfree::tensor::Vector;
     ///
     /// // Gauss's two points of a diagonal.
     /// let below = Shape::from(HalfSpace { point: Vector::zeros(), normal: Vector::from([1.0, 1.0]) });
-    /// let points = below.surface_points(None, &Vector::from([-1.0, -1.0]), &Vector::from([2.0, 2.0]), 1.0);
+    /// let square = GridBox { lower: Vector::from([-1.0, -1.0]), edges: Vector::from([2.0, 2.0]), spacing: 1.0 };
+    /// let points = below.surface_points(None, &square);
     /// let at = Vector::from([1.0, -1.0]) / 3.0_f64.sqrt();
     /// assert!(points.len() == 2 && points.iter().all(|point| (point.area - 2.0_f64.sqrt()).abs() < 1e-14));
     /// assert!((points[0].position - at).norm().min((points[0].position + at).norm()) < 1e-14);
     /// assert!((points[0].position + points[1].position).norm() < 1e-14);
     /// ```
-    pub fn surface_points(
-        &self,
-        region: Option<&Self>,
-        lower: &Vector<f64, D>,
-        edges: &Vector<f64, D>,
-        spacing: f64,
-    ) -> Vec<Facet<D>> {
-        let sides = self.sides(region, lower, edges, spacing, FLAT_FOR_LOADS[D.min(3) - 1]);
+    pub fn surface_points(&self, region: Option<&Self>, of: &GridBox<D>) -> Vec<Facet<D>> {
+        let sides = self.sides(region, of, FLAT_FOR_LOADS[D.min(3) - 1]);
         sides.iter().flat_map(Facet::points).collect()
     }
 
     /// Whether the surface in a box is approximated by planes.
-    fn has_planes(&self, lower: &Vector<f64, D>, edges: &Vector<f64, D>) -> bool {
-        let (center, radius) = around(lower, edges);
+    fn has_planes(&self, of: &GridBox<D>) -> bool {
+        let (center, radius) = of.around();
         match self.solid().alone(&center, radius) {
-            Some((part, _)) => part.has_planes(lower, edges),
-            None => self.solid().row(lower, edges, 0).is_none(),
+            Some((part, _)) => part.has_planes(of),
+            None => self.solid().row(of, 0).is_none(),
         }
     }
 }
@@ -205,8 +183,9 @@ mod tests {
         let edges = Vector::repeat((boxes as f64).recip());
         for i in indices([boxes; D]) {
             let lower = Vector::from_fn(|k, _| i[k] as f64 * edges[k]);
-            let (all, gaps) = shape.pieces_and_gaps(&lower, &edges, edges[0]);
-            let few = shape.quadrature(&lower, &edges, edges[0], degree, 1).unwrap();
+            let of = GridBox { lower, edges, spacing: edges[0] };
+            let (all, gaps) = shape.pieces_and_gaps(&of);
+            let few = shape.quadrature(&of, degree, 1).unwrap();
             let volume: f64 = few.iter().map(|point| point.volume).sum();
             if volume < THIN_PART * edges.product() {
                 continue;
@@ -241,12 +220,12 @@ mod tests {
     /// Solids are mirrored in every direction: a symmetric problem stays symmetric under loads.
     #[test]
     fn mirrored_solids_have_mirrored_points() {
-        let edges = Vector::repeat(1.0);
+        let cube = GridBox { lower: Vector::zeros(), edges: Vector::repeat(1.0), spacing: 1.0 };
         let center = Vector::from([0.1, -0.2, 0.3]);
         let points = |mirror: [u64; 3]| {
             let seen = |x: &Vector<f64, 3>| Vector::from_fn(|k, _| if mirror[k] > 0 { 1.0 - x[k] } else { x[k] });
             let ball: Shape<3> = Ball { center: seen(&center), radius: 0.9 }.into();
-            let points = ball.quadrature(&Vector::zeros(), &edges, 1.0, 3, 1).unwrap();
+            let points = ball.quadrature(&cube, 3, 1).unwrap();
             points.into_iter().map(|point| (seen(&point.position), point.volume)).collect::<Vec<_>>()
         };
         let first = points([0; 3]);
@@ -272,7 +251,8 @@ mod tests {
     fn sums(shape: &Shape<3>, boxes: u64, f: impl Fn(&Vector<f64, 3>) -> f64) -> f64 {
         let edges = Vector::repeat((boxes as f64).recip());
         let lowers = indices([boxes; 3]).map(|i| Vector::from_fn(|k, _| i[k] as f64 * edges[k]));
-        let points = lowers.flat_map(|lower| shape.quadrature(&lower, &edges, edges[0], 3, 2).unwrap());
+        let points =
+            lowers.flat_map(|lower| shape.quadrature(&GridBox { lower, edges, spacing: edges[0] }, 3, 2).unwrap());
         points.map(|point| point.volume * f(&point.position)).sum()
     }
 

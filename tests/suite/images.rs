@@ -2,7 +2,7 @@
 
 use crate::support::{Failure, Random, merged};
 use bfree::scene;
-use bfree::shape::{Filling, Layout, Mask, Pixels, Shape, Similar, fill};
+use bfree::shape::{Filling, GridBox, Layout, Mask, Pixels, Shape, Similar, fill};
 use bfree::tensor::{Vector, identity};
 use serde_json::{Value, json};
 use std::path::Path;
@@ -111,7 +111,8 @@ fn parts_of_boxes_by_pixels_and_by_the_planes_of_their_faces_agree() -> Result<(
     for _ in 0..50 {
         let lower = Vector::from_fn(|_, _| 0.5 + 3.0 * random.below(1000) as f64 / 1000.0);
         let edges = Vector::from([0.4, 0.3]);
-        let ((one, a), (other, b)) = (direct.part(&lower, &edges, 0.5), planes.part(&lower, &edges, 0.5));
+        let of = GridBox { lower, edges, spacing: 0.5 };
+        let ((one, a), (other, b)) = (direct.part(&of), planes.part(&of));
         assert!((one - other).abs() < 1e-9, "{lower}: {one} {other}");
         assert!((a - b).norm() * one < 1e-9, "{lower}: {a} {b}");
     }

@@ -1,7 +1,7 @@
 //! Shapes as drawn, against slow and simple geometry; and the messages for shapes that are drawn wrong.
 
 use crate::support::{Failure, assert_refused, built, cases};
-use bfree::shape::{Ball, Block, Cone, Polygon, PolygonError, Shape, Similar, rotation};
+use bfree::shape::{Ball, Block, Cone, GridBox, Polygon, PolygonError, Shape, Similar, rotation};
 use bfree::tensor::Vector;
 use proptest::prelude::*;
 use serde_json::{Value, json};
@@ -90,10 +90,11 @@ fn by_cells<const D: usize>(shape: &Shape<D>, r: f64, cells: usize) -> (f64, Vec
     let (mut volume, mut moment, mut area, mut normals) = (0.0, Vector::zeros(), 0.0, Vector::zeros());
     for id in 0..cells.pow(D as u32) {
         let lower = Vector::from_fn(|k, _| (id / cells.pow(k as u32) % cells) as f64 * h - r);
-        let (part, centroid) = shape.part(&lower, &Vector::repeat(h), h);
+        let of = GridBox { lower, edges: Vector::repeat(h), spacing: h };
+        let (part, centroid) = shape.part(&of);
         volume += part;
         moment += centroid * part;
-        for facet in shape.facets(None, &lower, &Vector::repeat(h), h) {
+        for facet in shape.facets(None, &of) {
             area += facet.area;
             normals += facet.normal * facet.area;
         }
@@ -149,7 +150,7 @@ proptest! {
     fn no_vertices_bring_a_polygon_down(vertices in prop::collection::vec(prop::array::uniform2(any::<f64>()), 0..6), x in prop::array::uniform2(any::<f64>())) {
         if let Ok(polygon) = Polygon::new(vertices.into_iter().map(Vector::from).collect()) {
             let shape = Shape::from(polygon);
-            shape.facets(None, &Vector::from(x), &Vector::repeat(1.0), 0.1);
+            shape.facets(None, &GridBox { lower: Vector::from(x), edges: Vector::repeat(1.0), spacing: 0.1 });
             shape.bounding_box();
         }
     }

@@ -4,7 +4,8 @@ use crate::support::{Failure, with};
 use bfree::grid::Grid;
 use bfree::scene;
 use bfree::shape::{
-    Ball, Block, Difference, Filling, Intersection, Shape, Similar, Surface, SurfaceError, Union, fill, rotation,
+    Ball, Block, Difference, Filling, GridBox, Intersection, Shape, Similar, Surface, SurfaceError, Union, fill,
+    rotation,
 };
 use bfree::tensor::Vector;
 use serde_json::{Value, json};
@@ -113,11 +114,12 @@ fn a_box_of_triangles_is_the_box() -> Result<(), Failure> {
         }
         for lower in points(point([-1.0; 3]), point([1.0; 3])) {
             let edges = point([0.3, 0.2, 0.25]);
-            let ((v, x), (w, y)) = (one.part(&lower, &edges, 1.0), other.part(&lower, &edges, 1.0));
+            let of = GridBox { lower, edges, spacing: 1.0 };
+            let ((v, x), (w, y)) = (one.part(&of), other.part(&of));
             assert!((v - w).abs() < 1e-14, "{lower}: {v} and {w}");
             assert!(w < 1e-6 || (x - y).norm() < 1e-9, "{lower}: {x} and {y}");
             let sums = |shape: &Shape<3>| {
-                let facets = shape.facets(None, &lower, &edges, 1.0);
+                let facets = shape.facets(None, &of);
                 let normals: Point = facets.iter().map(|facet| facet.normal * facet.area).sum();
                 (facets.iter().map(|facet| facet.area).sum::<f64>(), normals)
             };
@@ -189,7 +191,7 @@ fn the_facets_of_a_surface_are_all_of_it() -> Result<(), Failure> {
         let (mut area, mut normals) = (0.0, point([0.0; 3]));
         for i in 0..30 * 30 * 13 {
             let lower = point([f64::from(i % 30), f64::from(i / 30 % 30), f64::from(i / 900)]) * 0.1;
-            for facet in ring.facets(region, &lower, &Vector::repeat(0.1), 0.1) {
+            for facet in ring.facets(region, &GridBox { lower, edges: Vector::repeat(0.1), spacing: 0.1 }) {
                 area += facet.area;
                 normals += facet.normal * facet.area;
             }

@@ -6,7 +6,6 @@ mod uniform;
 pub use not_a_knot::NotAKnotBspline;
 pub use uniform::Bspline;
 
-use super::{Cells, Listed};
 use crate::problems::Problems;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -27,32 +26,14 @@ impl Default for BsplineParameters {
     }
 }
 
-impl Listed for Bspline {
-    type Parameters = BsplineParameters;
-    type Other = NotAKnotBspline;
-
-    fn build<A: From<Self> + From<Self::Other>>(
-        given: &BsplineParameters,
-        cells: Cells,
-        problems: &mut Problems,
-        path: &str,
-    ) -> Option<A> {
-        problems.whole(&format!("{path}.degree"), given.degree, 2, 3);
-        let spline = match given.degree {
-            2 => Self::Quadratic,
-            3 => Self::Cubic,
-            _ => return None,
-        };
-        Some(if cells.integrated { NotAKnotBspline(spline).into() } else { spline.into() })
-    }
-
-    fn examples<A: From<Self> + From<Self::Other>>() -> Vec<(&'static str, A)> {
-        let not_a_knot = |spline| A::from(NotAKnotBspline(spline));
-        vec![
-            ("quadratic", Self::Quadratic.into()),
-            ("cubic", Self::Cubic.into()),
-            ("not-a-knot quadratic", not_a_knot(Self::Quadratic)),
-            ("not-a-knot cubic", not_a_knot(Self::Cubic)),
-        ]
+impl BsplineParameters {
+    /// The splines that are mirrored at walls. If the degree is wrong, the result is `None` and `problems` says so.
+    pub(super) fn spline(&self, problems: &mut Problems, path: &str) -> Option<Bspline> {
+        problems.whole(&format!("{path}.degree"), self.degree, 2, 3);
+        match self.degree {
+            2 => Some(Bspline::Quadratic),
+            3 => Some(Bspline::Cubic),
+            _ => None,
+        }
     }
 }

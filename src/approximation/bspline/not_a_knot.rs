@@ -103,8 +103,4 @@ impl Separable for NotAKnotBspline {
         let own = self.0.pieces();
         Pieces { curves_at_walls: true, extension: own.degree, ..own }
     }
-
-    fn is_spline(&self) -> bool {
-        true
-    }
 }

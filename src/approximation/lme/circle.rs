@@ -1,20 +1,16 @@
 //! LME on a circle of nodes, as in the paper: a D-dimensional Newton method for the Lagrange multipliers of a particle.
 
-use super::locality::{radius, validate};
 use super::separable::Lme;
 use crate::approximation::product::{Place, inside};
 use crate::approximation::{ApproximationError, Scratch, Separable, ShapeFunction, Support, Validate};
 use crate::grid::{Grid, indices};
-use crate::tensor::{Tensor, Vector, determinant, identity, inverse, outer};
-use argmin::core::{CostFunction, Error, Executor, State};
-use argmin::solver::neldermead::NelderMead;
+use crate::tensor::{Tensor, Vector, determinant, inverse, outer};
 
 /// LME on the nodes with |D| < R_a = h sqrt(−ln TOL₀ / γ̂), the circle (sphere) of the paper, cut at the walls.
 ///
 /// 1. Connectivity (Algorithm 3): rounding gives the closest node. The nodes within the circle are kept from the rings around this node.
 /// 2. λ = argmin log Z (eq. 25), by Newton's method from the λ of the separable functions. An Armijo line search shortens the steps. The
-///    iteration ends when the error is at round-off. If Newton's method fails, a Nelder–Mead search without derivatives finds λ, and
-///    Newton's method refines it.
+///    iteration ends when the error is at round-off.
 /// 3. N, and ∇N = −N J⁻¹ D with J centred (eq. 27).
 ///
 /// On a wall λ is infinite, so a particle there is moved inside by [`LmeCircle::INSET`] h. The position then has an error of this size;
@@ -26,7 +22,6 @@ use argmin::solver::neldermead::NelderMead;
 /// use bfree::tensor::Vector;
 ///
 /// let circle = LmeCircle::new(1.5, 1e-6);
-/// assert_eq!((circle.gamma(), circle.tolerance()), (1.5, 1e-6));
 /// // It leaves out the corners of the box, where N is of the size of TOL₀.
 /// let grid = Grid { origin: Vector::zeros(), spacing: 1.0, cells: [20, 20] };
 /// let (x, mut scratch) = (Vector::from([10.3, 9.6]), Scratch::default());
@@ -41,10 +36,6 @@ use argmin::solver::neldermead::NelderMead;
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct LmeCircle {
-    gamma: f64,
-    tolerance: f64,
-    /// R_a/h
-    radius: f64,
     /// The separable functions with equal parameters; their λ is the first guess.
     product: Lme,
 }
@@ -53,8 +44,6 @@ pub struct LmeCircle {
 const NEWTON_STEPS: usize = 100;
 /// Convergence tolerance for a Newton step |Δλ|h: after a step below this, the error is about the square of the step.
 const LAST_STEP: f64 = 1e-9;
-/// Largest number of Nelder–Mead iterations.
-const SEARCH_STEPS: u64 = 2000;
 
 impl LmeCircle {
     /// The smallest distance from a wall, in units of h. A particle closer to the wall, or on the wall, is treated at this distance.
@@ -62,17 +51,7 @@ impl LmeCircle {
 
     /// The functions with locality γ̂ (0.8 … 4 are usual) and support tolerance TOL₀ (1e-6 is usual).
     pub fn new(gamma: f64, tolerance: f64) -> Self {
-        Self { gamma, tolerance, radius: radius(gamma, tolerance), product: Lme::new(gamma, tolerance) }
-    }
-
-    /// The locality γ̂.
-    pub fn gamma(&self) -> f64 {
-        self.gamma
-    }
-
-    /// The support tolerance TOL₀.
-    pub fn tolerance(&self) -> f64 {
-        self.tolerance
+        Self { product: Lme::new(gamma, tolerance) }
     }
 
     /// The limit −ln TOL₀ / (1 + (D−1)/4), below which γ̂ must stay. Then R_a² > (1 + (D−1)/4) h². So R_a exceeds the distance from the
@@ -93,22 +72,20 @@ impl LmeCircle {
 
     /// Fills `out` with the nodes in the circle. Their D, in units of h, are stored in place of the gradients.
     fn support<const D: usize>(&self, grid: &Grid<D>, places: &[Place; D], out: &mut Support<D>) {
+        let radius = self.product.radius;
         // Ring n holds |k − k₀| ≤ n, and |x − k₀| ≤ ½. So the rings with n < R + ½ reach into the circle.
-        let rings = (self.radius + 0.5).min(f64::from(u32::MAX)) as i64;
+        let rings = (radius + 0.5).min(f64::from(u32::MAX)) as i64;
         let (mut first, mut count) = ([0; D], [0; D]);
         for k in 0..D {
             let closest = i64::from(places[k].cell) + i64::from(places[k].below > 0.5);
             first[k] = (closest - rings).max(0);
-            count[k] = ((closest + rings).min(grid.axis(k).last()) - first[k] + 1) as u64;
+            count[k] = ((closest + rings).min(i64::from(grid.cells[k])) - first[k] + 1) as u64;
         }
         out.clear();
         for at in indices(count) {
             let node: [i64; D] = std::array::from_fn(|k| first[k] + at[k] as i64);
-            let distance: [f64; D] = std::array::from_fn(|k| {
-                let offset = (node[k] - i64::from(places[k].cell)) as f64;
-                if offset <= 0.0 { places[k].below - offset } else { -(places[k].above + (offset - 1.0)) }
-            });
-            if distance.iter().map(|d| d * d).sum::<f64>() < self.radius * self.radius {
+            let distance: [f64; D] = std::array::from_fn(|k| places[k].distance(node[k]));
+            if distance.iter().map(|d| d * d).sum::<f64>() < radius * radius {
                 out.push(node.map(|index| index as u32), 0.0, distance);
             }
         }
@@ -116,7 +93,6 @@ impl LmeCircle {
 }
 
 /// The dual function log Z(λ) of one particle.
-#[derive(Clone, Copy)]
 struct Dual<'a, const D: usize> {
     gamma: f64,
     /// D of each node, in units of h.
@@ -150,22 +126,15 @@ impl<const D: usize> Dual<'_, D> {
                 ((self.exponent(lambda, distance) - log_z).exp(), Vector::<f64, D>::from_column_slice(distance))
             })
         };
-        let mut r: Vector<f64, D> = Vector::zeros();
-        for (n, distance) in values() {
-            r += distance * n;
-        }
-        let mut j: Tensor<f64, D> = Tensor::zeros();
-        for (n, distance) in values() {
-            let d = distance - r;
-            j += outer(&d, &d) * n;
-        }
+        let r: Vector<f64, D> = values().map(|(n, distance)| distance * n).sum();
+        let j = values().map(|(n, distance)| outer(&(distance - r), &(distance - r)) * n).sum();
         Moments { log_z, r, j }
     }
 
-    /// λ by a damped Newton method in at most `steps` steps; `None` if the method fails.
-    fn newton(&self, start: Vector<f64, D>, steps: usize) -> Option<Vector<f64, D>> {
+    /// λ = argmin log Z by a damped Newton method; `None` if the method fails.
+    fn minimize(&self, start: Vector<f64, D>) -> Option<Vector<f64, D>> {
         let mut lambda = start;
-        for _ in 0..steps {
+        for _ in 0..NEWTON_STEPS {
             let Moments { log_z, r, j } = self.moments(&lambda);
             let step = -solve(&j, &r)?;
             if step.amax() <= LAST_STEP {
@@ -185,37 +154,6 @@ impl<const D: usize> Dual<'_, D> {
         }
         None
     }
-
-    /// λ by the Nelder–Mead simplex search, accurate to about the square root of round-off.
-    fn search(&self, start: Vector<f64, D>) -> Option<Vector<f64, D>> {
-        let simplex = std::iter::once(start)
-            .chain((0..D).map(|k| start + Vector::<f64, D>::from(identity::<f64, D>().column(k))))
-            .map(|vertex| vertex.as_slice().to_vec())
-            .collect();
-        let result = Executor::new(*self, NelderMead::new(simplex))
-            .configure(|state| state.max_iters(SEARCH_STEPS))
-            .timer(false);
-        let result = result.run().ok()?;
-        let best = result.state().get_best_param()?;
-        (best.len() == D).then(|| Vector::from_column_slice(best))
-    }
-
-    /// λ = argmin log Z by Newton's method in at most `steps` steps. If this method fails, the search finds λ, and Newton's
-    /// method refines it.
-    fn minimize(&self, start: Vector<f64, D>, steps: usize) -> Option<Vector<f64, D>> {
-        self.newton(start, steps).or_else(|| self.newton(self.search(start)?, NEWTON_STEPS))
-    }
-}
-
-impl<const D: usize> CostFunction for Dual<'_, D> {
-    type Param = Vec<f64>;
-    type Output = f64;
-
-    fn cost(&self, lambda: &Vec<f64>) -> Result<f64, Error> {
-        // The search compares costs, and a comparison with NaN means nothing.
-        let log_z = self.log_z(&Vector::from_column_slice(lambda));
-        Ok(if log_z.is_finite() { log_z } else { f64::MAX })
-    }
 }
 
 /// J⁻¹ b; `None` unless det J > 0 and the result is finite. Cofactors make the result insensitive to the scale of J along each axis.
@@ -226,26 +164,23 @@ fn solve<const D: usize>(j: &Tensor<f64, D>, b: &Vector<f64, D>) -> Option<Vecto
 
 /// Moves a particle inside if it is closer to a wall than [`LmeCircle::INSET`]. The distance to the wall node stays accurate.
 fn inset(place: Place, cells: u32) -> Place {
-    let Place { cell, mut below, mut above } = place;
-    if cell == 0 && below < LmeCircle::INSET {
-        (below, above) = (LmeCircle::INSET, 1.0 - LmeCircle::INSET);
+    const INSET: f64 = LmeCircle::INSET;
+    if place.cell == 0 && place.below < INSET {
+        Place { below: INSET, above: 1.0 - INSET, ..place }
+    } else if place.cell + 1 == cells && place.above < INSET {
+        Place { below: 1.0 - INSET, above: INSET, ..place }
+    } else {
+        place
     }
-    if cell + 1 == cells && above < LmeCircle::INSET {
-        (below, above) = (1.0 - LmeCircle::INSET, LmeCircle::INSET);
-    }
-    Place { cell, below, above }
 }
 
 impl Validate for LmeCircle {
     fn validate(&self, dimension: usize) -> Result<(), ApproximationError> {
-        let Self { gamma, tolerance, .. } = *self;
-        validate(gamma, tolerance)?;
+        self.product.validate(dimension)?;
+        let Lme { gamma, tolerance, .. } = self.product;
         let limit = Self::largest_gamma(tolerance, dimension);
-        if gamma < limit {
-            Ok(())
-        } else {
-            Err(ApproximationError::SupportTooSmall { gamma, tolerance, dimension, limit })
-        }
+        let too_small = ApproximationError::SupportTooSmall { gamma, tolerance, dimension, limit };
+        if gamma < limit { Ok(()) } else { Err(too_small) }
     }
 }
 
@@ -268,13 +203,13 @@ impl ShapeFunction for LmeCircle {
         }
         self.support(grid, &places, out);
 
-        let dual = Dual { gamma: self.gamma, distances: &out.gradients };
+        let dual = Dual { gamma: self.product.gamma, distances: &out.gradients };
         let failed = |lambda: &Vector<f64, D>| ApproximationError::NoMultipliers {
-            gamma: self.gamma,
+            gamma: self.product.gamma,
             position: x.as_slice().to_vec(),
             residual: dual.moments(lambda).r.amax(),
         };
-        let lambda = dual.minimize(start, NEWTON_STEPS).ok_or_else(|| failed(&start))?;
+        let lambda = dual.minimize(start).ok_or_else(|| failed(&start))?;
         let Moments { log_z, r, j } = dual.moments(&lambda);
         if solve(&j, &r).is_none() {
             return Err(failed(&lambda));
@@ -301,35 +236,10 @@ impl ShapeFunction for LmeCircle {
 mod tests {
     use super::*;
 
-    /// D of the nodes −2 … 3 along both axes within R of `x`. A wall at −`below` cuts the first axis.
-    fn distances(x: [f64; 2], below: i32, radius: f64) -> Vec<[f64; 2]> {
-        (-2..=3)
-            .flat_map(|k| (-below..=3).map(move |i| [x[0] - f64::from(i), x[1] - f64::from(k)]))
-            .filter(|d| d[0].hypot(d[1]) < radius)
-            .collect()
-    }
-
-    #[test]
-    fn without_newton_the_search_finds_the_same_multipliers() {
-        for (x, below, gamma) in
-            [([0.3, 0.45], 2, 3.0), ([0.5, 0.5], 2, 0.8), ([0.001, 0.2], 0, 4.0), ([0.01, 0.98], 2, 9.0)]
-        {
-            let nodes = distances(x, below, radius(gamma, 1e-6));
-            let dual = Dual { gamma, distances: &nodes };
-            let newton = dual.newton(Vector::zeros(), NEWTON_STEPS).expect("inside the hull");
-            assert!(dual.moments(&newton).r.amax() < 1e-14);
-            assert!(dual.newton(Vector::zeros(), 0).is_none());
-            let search = dual.search(Vector::zeros()).expect("the search always answers");
-            assert!(dual.moments(&search).r.amax() < 1e-5, "{x:?}: {}", dual.moments(&search).r.amax());
-            let fallback = dual.minimize(Vector::zeros(), 0).expect("inside the hull");
-            assert!((fallback - newton).amax() < 1e-10, "{x:?}: {fallback} and {newton}");
-        }
-    }
-
     #[test]
     fn outside_the_hull_nothing_is_found() {
         // All nodes lie on one side, so log Z falls without limit.
         let nodes = [[0.5, 0.1], [0.5, -0.9], [1.5, 0.1]];
-        assert!(Dual { gamma: 3.0, distances: &nodes }.minimize(Vector::zeros(), NEWTON_STEPS).is_none());
+        assert!(Dual { gamma: 3.0, distances: &nodes }.minimize(Vector::zeros()).is_none());
     }
 }

@@ -3,15 +3,12 @@
 //! Arroyo & Ortiz, Int. J. Numer. Meth. Engng 65 (2006). Lengths are in units of the spacing, so β̂ = γ̂/h².
 
 mod circle;
-mod locality;
 mod separable;
 mod starts;
 
 pub use circle::LmeCircle;
-pub use locality::SMALLEST_TOLERANCE;
 pub use separable::Lme;
 
-use super::{Cells, Listed};
 use crate::problems::{Number, Problems};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -52,39 +49,21 @@ impl Default for LmeParameters {
     }
 }
 
-impl Listed for Lme {
-    type Parameters = LmeParameters;
-    type Other = LmeCircle;
-
-    fn build<A: From<Self> + From<Self::Other>>(
-        given: &LmeParameters,
-        cells: Cells,
-        problems: &mut Problems,
-        path: &str,
-    ) -> Option<A> {
-        let LmeParameters { gamma, tolerance, support } = *given;
+impl LmeParameters {
+    /// Whether the parameters are allowed in `dimension` = 1, 2 or 3 dimensions; `problems` lists those that are not.
+    pub(super) fn check(&self, dimension: usize, problems: &mut Problems, path: &str) -> bool {
+        let Self { gamma, tolerance, support } = *self;
+        let path_of_gamma = format!("{path}.gamma");
         let tolerance_ok = problems.between(&format!("{path}.tolerance"), tolerance, 1e-16, 1e-2);
-        let ok = problems.between(&format!("{path}.gamma"), gamma, 0.1, 1000.0) && tolerance_ok;
-        if support == LmeSupport::Separable {
-            return ok.then(|| Self::new(gamma, tolerance).into());
+        let ok = problems.between(&path_of_gamma, gamma, 0.1, 1000.0) && tolerance_ok;
+        let limit = LmeCircle::largest_gamma(tolerance, dimension);
+        if !ok || support == LmeSupport::Separable || gamma < limit {
+            return ok;
         }
-        let limit = LmeCircle::largest_gamma(tolerance, cells.dimension);
-        let reached = ok && gamma >= limit;
         let allowed = format_args!(
             "must be less than {limit:.4} with the circle, at this tolerance and dimension; \"separable\" has no such limit"
         );
-        problems.require(!reached, &format!("{path}.gamma"), Number(gamma), allowed);
-        (ok && !reached).then(|| LmeCircle::new(gamma, tolerance).into())
-    }
-
-    /// Members on the box and on the circle. The widest functions, with γ̂ = 0.8, are on the box alone.
-    fn examples<A: From<Self> + From<Self::Other>>() -> Vec<(&'static str, A)> {
-        vec![
-            ("lme 0.8", Self::new(0.8, 1e-6).into()),
-            ("lme 1.8", Self::new(1.8, 1e-6).into()),
-            ("lme 3", Self::new(3.0, 1e-6).into()),
-            ("lme circle 1.8", LmeCircle::new(1.8, 1e-6).into()),
-            ("lme circle 3", LmeCircle::new(3.0, 1e-6).into()),
-        ]
+        problems.refuse(&path_of_gamma, Number(gamma), allowed);
+        false
     }
 }

@@ -1,6 +1,5 @@
 //! LME on a box of nodes: a product of one-dimensional LME functions, each of which needs the root of one scalar equation.
 
-use super::locality::{radius, validate};
 use super::starts::Starts;
 use crate::approximation::interior::{
     Column, FURTHEST, InCells, InLanes, Interior, NODES, Rows, SETTLED, distance, evaluate,
@@ -41,8 +40,6 @@ use std::sync::Arc;
 /// use bfree::approximation::{AxisWeights, Lme, Separable};
 /// use bfree::grid::Axis;
 ///
-/// let lme = Lme::new(3.0, 1e-6);
-/// assert_eq!((lme.gamma(), lme.tolerance()), (3.0, 1e-6));
 /// // The larger γ̂, the fewer nodes: R_a = h sqrt(−ln TOL₀ / γ̂), and in the limit the hats.
 /// let axis = Axis { origin: 0.0, spacing: 1.0, cells: 40 };
 /// let seen = |gamma: f64| {
@@ -56,10 +53,12 @@ use std::sync::Arc;
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lme {
-    gamma: f64,
-    tolerance: f64,
+    /// γ̂
+    pub(super) gamma: f64,
+    /// TOL₀
+    pub(super) tolerance: f64,
     /// R_a/h
-    radius: f64,
+    pub(super) radius: f64,
     /// exp(−2γ̂) = gⱼ gⱼ₋₂ / gⱼ₋₁²
     decay: f64,
     /// The table of q away from walls.
@@ -73,26 +72,19 @@ pub(super) struct Reach {
     pub upper: u32,
 }
 
+/// The smallest TOL₀ that the family accepts. Such a weight is far below round-off next to 1, and still far from underflow.
+const SMALLEST_TOLERANCE: f64 = 1e-100;
+
 /// Largest number of iterations of the bracketed Newton method; bisection alone would need fewer.
 const ITERATIONS: usize = 200;
 
 impl Lme {
     /// The functions with locality γ̂ (0.8 … 4 are usual) and support tolerance TOL₀ (1e-6 is usual).
     pub fn new(gamma: f64, tolerance: f64) -> Self {
-        let radius = radius(gamma, tolerance);
+        let radius = (-tolerance.ln() / gamma).sqrt();
         let mut lme = Self { gamma, tolerance, radius, decay: (-2.0 * gamma).exp(), starts: None };
         lme.starts = Starts::new(gamma, radius, |place| lme.table_entry(place)).map(Arc::new);
         lme
-    }
-
-    /// The locality γ̂.
-    pub fn gamma(&self) -> f64 {
-        self.gamma
-    }
-
-    /// The support tolerance TOL₀.
-    pub fn tolerance(&self) -> f64 {
-        self.tolerance
     }
 
     /// The number of nodes with |D| < R_a beyond those of the cell, limited by the ends of the axis.
@@ -239,7 +231,14 @@ impl Lme {
 
 impl Validate for Lme {
     fn validate(&self, _dimension: usize) -> Result<(), ApproximationError> {
-        validate(self.gamma, self.tolerance)
+        let refused = |parameter, value, allowed| Err(ApproximationError::Parameter { parameter, value, allowed });
+        if !(self.gamma > 0.0 && self.gamma.is_finite()) {
+            refused("the locality γ of max-ent", self.gamma, "finite and > 0")
+        } else if !(SMALLEST_TOLERANCE..1.0).contains(&self.tolerance) {
+            refused("the support tolerance of max-ent", self.tolerance, ">= 1e-100 and < 1")
+        } else {
+            Ok(())
+        }
     }
 }
 
@@ -250,14 +249,11 @@ impl InLanes for Lme {
     }
 
     fn evaluate(&self, points: &InCells, out: Rows<'_>) -> usize {
-        if self.radius <= 2.0 {
-            evaluate::<1>(self, self.radius, points, out)
-        } else if self.radius <= 3.0 {
-            evaluate::<2>(self, self.radius, points, out)
-        } else if self.radius <= 4.0 {
-            evaluate::<3>(self, self.radius, points, out)
-        } else {
-            evaluate::<FURTHEST>(self, self.radius, points, out)
+        match self.radius.ceil() as usize {
+            0..=2 => evaluate::<1>(self, self.radius, points, out),
+            3 => evaluate::<2>(self, self.radius, points, out),
+            4 => evaluate::<3>(self, self.radius, points, out),
+            _ => evaluate::<FURTHEST>(self, self.radius, points, out),
         }
     }
 }
@@ -265,7 +261,7 @@ impl InLanes for Lme {
 impl Separable for Lme {
     #[inline]
     fn axis(&self, axis: &Axis, x: f64, out: &mut AxisWeights) -> Result<(), ApproximationError> {
-        validate(self.gamma, self.tolerance)?;
+        self.validate(1)?;
         let place = Place::new(axis, x)?;
         let reach = self.reach(axis, &place);
         // All nodes lie on one side, so λ → ±∞. The limit is N = 1 at the wall, with the slopes of the linear functions.

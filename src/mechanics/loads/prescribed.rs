@@ -146,7 +146,7 @@ pub struct PrescribedDof {
 /// let floor = Prescribed { name: "floor".into(), on: face(1), motion: [None, Some(Motion::Rest)] };
 /// let wall = Prescribed { name: "wall".into(), on: face(0), motion: [pushing, None] };
 /// // The nodes of the cell in the corner: two on the floor, two at the wall, one of them in both pairs.
-/// let nodes = Nodes::new([[[0, 0], [1, 0], [0, 1], [1, 1]].map(|index| grid.id(index))].iter().map(|ids| ids.as_slice()));
+/// let nodes = Nodes::new([[0, 0], [1, 0], [0, 1], [1, 1]].map(|index| grid.id(index)).into());
 /// let dofs = prescribed_dofs(&[floor, wall], &grid, &nodes, &[], 0.0, 0.5);
 /// let held: Vec<_> = dofs.iter().map(|dof| (dof.node, dof.component, dof.step.increment)).collect();
 /// assert_eq!(held, [(0, 0, 1.0), (0, 1, 0.0), (1, 1, 0.0), (2, 0, 1.0)]);

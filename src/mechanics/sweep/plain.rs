@@ -45,7 +45,7 @@ impl<const D: usize> Plain<D> {
         let tasks: Vec<_> = particles.chunks(TASK * LANES).collect();
         let lists = parallel::map(tasks.len(), &|task| lists(approximation, grid, points, tasks[task]));
         let lists = lists.into_iter().collect::<Result<Vec<_>, _>>()?;
-        let nodes = Nodes::new(lists.iter().map(|(_, ids)| ids.as_slice()));
+        let nodes = Nodes::new(lists.iter().flat_map(|(_, ids)| ids).copied().collect());
         let mut offsets = vec![0];
         let mut numbers = Vec::new();
         let mut weights = Vec::new();

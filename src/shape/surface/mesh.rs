@@ -1,7 +1,8 @@
 //! Triangles that bound a solid, and the point of them nearest to another.
 
 use super::sound::{SurfaceError, crossing, neighbours, nested};
-use super::tree::{Bounds, Tree};
+use super::tree::Tree;
+use crate::shape::bounds::Bounds;
 use nalgebra::Vector3;
 
 /// The triangles, counter-clockwise as seen from outside, with their neighbours and normals.
@@ -35,8 +36,8 @@ impl Mesh {
         if triangles.len().max(vertices.len()) > u32::MAX as usize {
             return Err(SurfaceError::TooMany(triangles.len()));
         }
-        if let Some(x) = vertices.iter().find(|x| !x.iter().all(|x| x.is_finite())) {
-            return Err(SurfaceError::NotFinite([x[0], x[1], x[2]]));
+        if let Some(&x) = vertices.iter().find(|x| !x.iter().all(|x| x.is_finite())) {
+            return Err(SurfaceError::NotFinite(x.into()));
         }
         for (triangle, corners) in triangles.iter().enumerate() {
             if let Some(&vertex) = corners.iter().find(|&&vertex| vertex as usize >= vertices.len()) {
@@ -46,8 +47,7 @@ impl Mesh {
         // 6 V = Σ a·(b × c), about a point near the surface
         let origin = vertices[triangles[0][0] as usize];
         let corner = |i: u32| vertices[i as usize] - origin;
-        let volumes = triangles.iter().map(|&[a, b, c]| corner(a).dot(&corner(b).cross(&corner(c))));
-        let volume = volumes.sum::<f64>();
+        let volume: f64 = triangles.iter().map(|&[a, b, c]| corner(a).dot(&corner(b).cross(&corner(c)))).sum();
         if volume < 0.0 {
             triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
         }
@@ -57,21 +57,18 @@ impl Mesh {
         }
         let tree = Self::tree(&vertices, &triangles);
         if let Some(x) = crossing(&vertices, &triangles, &tree) {
-            return Err(SurfaceError::Crossing([x[0], x[1], x[2]]));
+            return Err(SurfaceError::Crossing(x.into()));
         }
         if let Some(x) = nested(&vertices, &triangles, &neighbours) {
-            return Err(SurfaceError::Nested([x[0], x[1], x[2]]));
+            return Err(SurfaceError::Nested(x.into()));
         }
         let (mut normals, mut at_vertices) = (Vec::new(), vec![Vector3::zeros(); vertices.len()]);
         for triangle in &triangles {
             let [a, b, c] = triangle.map(|i| vertices[i as usize]);
             let normal = (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_default();
             normals.push(normal);
-            for (i, angle) in
-                triangle.iter().zip([(b - a).angle(&(c - a)), (c - b).angle(&(a - b)), (a - c).angle(&(b - c))])
-            {
-                at_vertices[*i as usize] += normal * angle;
-            }
+            let angles = [(b - a).angle(&(c - a)), (c - b).angle(&(a - b)), (a - c).angle(&(b - c))];
+            triangle.iter().zip(angles).for_each(|(&i, angle)| at_vertices[i as usize] += normal * angle);
         }
         Ok(Self { vertices, triangles, neighbours, normals, at_vertices, tree })
     }
@@ -79,6 +76,14 @@ impl Mesh {
     pub fn tree(vertices: &[Vector3<f64>], triangles: &[[u32; 3]]) -> Tree {
         let bounds = |triangle: &[u32; 3]| Bounds::of(triangle.iter().map(|&i| vertices[i as usize]));
         Tree::new(triangles.iter().map(bounds).collect())
+    }
+
+    /// The triangles whose bounds meet a box, in order.
+    pub fn meeting(&self, bounds: &Bounds<3>) -> Vec<usize> {
+        let mut found = Vec::new();
+        self.tree.meeting(bounds, |triangle| found.push(triangle));
+        found.sort_unstable();
+        found
     }
 
     pub fn corners(&self, triangle: usize) -> [Vector3<f64>; 3] {
@@ -118,10 +123,10 @@ impl Mesh {
     /// and Aanæs, 2005).
     pub fn nearest(&self, x: &Vector3<f64>) -> (f64, Vector3<f64>) {
         let distance = |triangle: usize| {
-            let (at, foot) = self.foot(triangle, x);
-            ((x - at).norm_squared(), (at, foot))
+            let (at, part) = self.foot(triangle, x);
+            ((x - at).norm_squared(), (x - at, part))
         };
-        let Some((squared, triangle, (at, foot))) = self.tree.nearest(x, distance) else {
+        let Some((squared, triangle, (away, foot))) = self.tree.nearest(x, distance) else {
             return (f64::INFINITY, Vector3::x());
         };
         let outward = match foot {
@@ -129,7 +134,6 @@ impl Mesh {
             Foot::Edge(i) => self.normals[triangle] + self.normals[self.neighbours[triangle][i] as usize],
             Foot::Vertex(i) => self.at_vertices[self.triangles[triangle][i] as usize],
         };
-        let away = x - at;
         let side = if away.dot(&outward) < 0.0 { -1.0 } else { 1.0 };
         let distance = side * squared.sqrt();
         // On the surface, or so near that the direction is round-off, the normal is that of the surface.

@@ -7,12 +7,12 @@ mod tree;
 
 pub use sound::SurfaceError;
 
-use super::{Face, Facet, Solid};
+use super::bounds::Bounds;
+use super::{Face, Facet, GridBox, Part, Solid};
 use crate::tensor::{Tensor, Vector};
 use mesh::Mesh;
 use nalgebra::{Matrix3, Vector3};
 use std::sync::Arc;
-use tree::Bounds;
 
 /// The largest number of planes for the triangles near a point. If there are more, triangles with similar normals share one plane.
 const PLANES: usize = 6;
@@ -96,13 +96,8 @@ impl<const D: usize> Solid<D> for Surface<D> {
     /// through their middle.
     fn add_planes(&self, x: &Vector<f64, D>, radius: f64, planes: &mut Vec<Face<D>>) -> f64 {
         let (mesh, x, reach) = (&self.mesh, space(x), Vector3::repeat(radius));
-        let mut near = Vec::new();
-        mesh.tree.meeting(&Bounds(x - reach, x + reach), |i| {
-            if mesh.normals[i] != Vector3::zeros() && (mesh.foot(i, &x).0 - x).norm() < radius {
-                near.push(i);
-            }
-        });
-        near.sort_unstable();
+        let mut near = mesh.meeting(&Bounds(x - reach, x + reach));
+        near.retain(|&i| mesh.normals[i] != Vector3::zeros() && (mesh.foot(i, &x).0 - x).norm() < radius);
         let height = |i: usize, from: &Vector3<f64>| mesh.normals[i].dot(&(from - mesh.corners(i)[0]));
         let mut single: Vec<Face<D>> = Vec::new();
         for &i in &near {
@@ -125,9 +120,9 @@ impl<const D: usize> Solid<D> for Surface<D> {
             let Some(normal) = sum.try_normalize(0.0) else { continue };
             let corners =
                 group.iter().flat_map(|&i| rows::clipped(mesh.corners(i).map(|corner| corner - x).to_vec(), &reach, 0));
-            let (low, high) = corners
-                .map(|corner| normal.dot(&corner))
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), d| (low.min(d), high.max(d)));
+            let heights: Vec<f64> = corners.map(|corner| normal.dot(&corner)).collect();
+            let low = heights.iter().copied().fold(f64::INFINITY, f64::min);
+            let high = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
             planes.push((-0.5 * (low + high), plane(normal)));
             departure = departure.max(0.5 * (high - low));
         }
@@ -140,14 +135,11 @@ impl<const D: usize> Solid<D> for Surface<D> {
     }
 
     /// The triangles, clipped to the box.
-    fn facets(&self, lower: &Vector<f64, D>, edges: &Vector<f64, D>, planes: &[Face<D>]) -> Option<Vec<Facet<D>>> {
-        let (mesh, half) = (&self.mesh, space(edges) * 0.5);
-        let center = space(lower) + half;
-        let mut near = Vec::new();
-        mesh.tree.meeting(&Bounds(center - half, center + half), |i| near.push(i));
-        near.sort_unstable();
+    fn facets(&self, of: &GridBox<D>, planes: &[Face<D>]) -> Option<Vec<Facet<D>>> {
+        let (mesh, half) = (&self.mesh, space(&of.edges) * 0.5);
+        let center = space(&of.lower) + half;
         let mut facets = Vec::new();
-        for i in near {
+        for i in mesh.meeting(&Bounds(center - half, center + half)) {
             let corners = mesh.corners(i).map(|corner| corner - center).to_vec();
             // A triangle in a face of the box belongs to the box on the inner side of that triangle.
             let outside = |k: usize, sign: f64| {
@@ -176,8 +168,9 @@ impl<const D: usize> Solid<D> for Surface<D> {
         Some(facets)
     }
 
-    fn row(&self, lower: &Vector<f64, D>, edges: &Vector<f64, D>, count: usize) -> Option<Vec<(f64, Vector<f64, D>)>> {
-        let row = self.mesh.row(&space(lower), &space(edges), count);
+    fn row(&self, first: &GridBox<D>, count: usize) -> Option<Vec<Part<D>>> {
+        let first = GridBox { lower: space(&first.lower), edges: space(&first.edges), spacing: first.spacing };
+        let row = self.mesh.row(&first, count);
         Some(row.into_iter().map(|(volume, centroid)| (volume, plane(centroid))).collect())
     }
 }

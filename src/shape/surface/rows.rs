@@ -5,7 +5,8 @@
 //! section of the row: ∫ clamp(x) − x₀ over the projections of the triangles. Each triangle counts with the sign of its side.
 
 use super::mesh::Mesh;
-use super::tree::Bounds;
+use crate::shape::bounds::Bounds;
+use crate::shape::{GridBox, Part};
 use nalgebra::Vector3;
 
 /// ∫ 1, ξ, y, z over a volume, ξ from the beginning of a box, y and z from the middle of the section.
@@ -51,6 +52,10 @@ pub fn clipped(mut polygon: Polygon, r: &Vector3<f64>, first: usize) -> Polygon 
     polygon
 }
 
+fn add(sums: &mut Moments, other: &Moments) {
+    sums.iter_mut().zip(other).for_each(|(sum, other)| *sum += other);
+}
+
 /// ∫ f, f²/2, y f, z f over the projection of a polygon along the row, for linear f.
 fn integrals(polygon: &[Vector3<f64>], f: impl Fn(&Vector3<f64>) -> f64) -> Moments {
     let mut sums = [0.0; 4];
@@ -66,32 +71,24 @@ fn integrals(polygon: &[Vector3<f64>], f: impl Fn(&Vector3<f64>) -> f64) -> Mome
             let both: f64 = values.iter().zip(&g).map(|(f, g)| f * g).sum();
             twice_area / 24.0 * (sum * g.iter().sum::<f64>() + both)
         };
-        let of_triangle = [
-            twice_area / 6.0 * sum,
-            0.5 * product(values),
-            product(corners.map(|x| x[1])),
-            product(corners.map(|x| x[2])),
-        ];
-        sums.iter_mut().zip(of_triangle).for_each(|(sum, of)| *sum += of);
+        let [of_y, of_z] = [1, 2].map(|k| product(corners.map(|x| x[k])));
+        add(&mut sums, &[twice_area / 6.0 * sum, 0.5 * product(values), of_y, of_z]);
     }
     sums
 }
 
 impl Mesh {
-    /// Volume and centroid of the solid in `count` boxes next to each other along the first axis. The first box begins at `lower`, and all
-    /// boxes have these edges.
-    pub fn row(&self, lower: &Vector3<f64>, edges: &Vector3<f64>, count: usize) -> Vec<(f64, Vector3<f64>)> {
+    /// The parts of the solid in `count` equal boxes next to each other along the first axis.
+    pub fn row(&self, first_box: &GridBox<3>, count: usize) -> Vec<Part<3>> {
+        let GridBox { lower, edges, .. } = first_box;
         let h = edges[0];
         let middle = Vector3::new(lower[0], lower[1] + 0.5 * edges[1], lower[2] + 0.5 * edges[2]);
         let mut parts = vec![[0.0; 4]; count];
         // Integrals over the triangles in each box k. For these triangles, all boxes before k count with their whole length.
         let mut beyond = vec![[0.0; 4]; count + 1];
-        let upper = lower + edges;
-        let all = f64::INFINITY;
-        let mut triangles = Vec::new();
-        self.tree.meeting(&Bounds(*lower, Vector3::new(all, upper[1], upper[2])), |i| triangles.push(i));
-        triangles.sort_unstable();
-        for triangle in triangles {
+        let mut upper = lower + edges;
+        upper[0] = f64::INFINITY;
+        for triangle in self.meeting(&Bounds(*lower, upper)) {
             let mut polygon = clipped(self.corners(triangle).map(|x| x - middle).to_vec(), &(edges * 0.5), 1);
             let Some(first) = polygon.iter().map(|x| x[0]).reduce(f64::min) else { continue };
             // The cast saturates at 0.
@@ -100,31 +97,22 @@ impl Mesh {
             while k < count && !polygon.is_empty() {
                 let from = k as f64 * h;
                 let (part, rest) = split(&polygon, |x| x[0] - (from + h));
-                let inside = integrals(&part, |x| x[0] - from);
-                let ahead = integrals(&part, |_| 1.0);
-                for j in 0..4 {
-                    parts[k][j] += inside[j];
-                    beyond[k][j] += ahead[j];
-                }
+                add(&mut parts[k], &integrals(&part, |x| x[0] - from));
+                add(&mut beyond[k], &integrals(&part, |_| 1.0));
                 polygon = rest;
                 k += 1;
             }
-            let ahead = integrals(&polygon, |_| 1.0);
-            (0..4).for_each(|j| beyond[count][j] += ahead[j]);
+            add(&mut beyond[count], &integrals(&polygon, |_| 1.0));
         }
         let mut ahead = [0.0; 4];
-        let mut row: Vec<_> = (0..count)
-            .rev()
-            .map(|k| {
-                (0..4).for_each(|j| ahead[j] += beyond[k + 1][j]);
-                let whole = [h * ahead[0], 0.5 * h * h * ahead[0], h * ahead[2], h * ahead[3]];
-                let [volume, x, y, z] = std::array::from_fn(|j| parts[k][j] + whole[j]);
-                let from = middle + Vector3::new(k as f64 * h, 0.0, 0.0);
-                let inside = volume > 0.0;
-                (volume.max(0.0), if inside { from + Vector3::new(x, y, z) / volume } else { from })
-            })
-            .collect();
-        row.reverse();
-        row
+        for k in (0..count).rev() {
+            add(&mut ahead, &beyond[k + 1]);
+            add(&mut parts[k], &[h * ahead[0], 0.5 * h * h * ahead[0], h * ahead[2], h * ahead[3]]);
+        }
+        let part = |(k, [volume, x, y, z]): (usize, [f64; 4])| {
+            let from = middle + Vector3::new(k as f64 * h, 0.0, 0.0);
+            (volume.max(0.0), if volume > 0.0 { from + Vector3::new(x, y, z) / volume } else { from })
+        };
+        parts.into_iter().enumerate().map(part).collect()
     }
 }

@@ -1,6 +1,7 @@
 //! The check that a surface bounds a solid: it is closed, faces one way and does not cross itself.
 
-use super::tree::{Bounds, Tree};
+use super::tree::Tree;
+use crate::shape::bounds::Bounds;
 use nalgebra::Vector3;
 use std::collections::HashMap;
 
@@ -53,10 +54,6 @@ pub enum SurfaceError {
     Flat,
 }
 
-fn place(x: &Vector3<f64>) -> [f64; 3] {
-    [x[0], x[1], x[2]]
-}
-
 /// The edges of a triangle, each in the direction around the triangle.
 fn edges([a, b, c]: [u32; 3]) -> [[u32; 2]; 3] {
     [[a, b], [b, c], [c, a]]
@@ -68,48 +65,36 @@ fn edges([a, b, c]: [u32; 3]) -> [[u32; 2]; 3] {
 /// # Errors
 /// The first edge that breaks this rule.
 pub fn neighbours(vertices: &[Vector3<f64>], triangles: &[[u32; 3]]) -> Result<Vec<[u32; 3]>, SurfaceError> {
-    let ends = |[a, b]: [u32; 2]| (place(&vertices[a as usize]), place(&vertices[b as usize]));
+    let place = |vertex: u32| vertices[vertex as usize].into();
     let mut along = HashMap::with_capacity(3 * triangles.len());
     for (i, &triangle) in (0..).zip(triangles) {
-        for edge in edges(triangle) {
-            if along.insert(edge, i).is_some() {
-                let (a, b) = ends(edge);
-                return Err(SurfaceError::Unorientable(a, b));
+        for [a, b] in edges(triangle) {
+            if along.insert([a, b], i).is_some() {
+                return Err(SurfaceError::Unorientable(place(a), place(b)));
             }
         }
     }
-    let mut beyond = Vec::with_capacity(triangles.len());
-    for &triangle in triangles {
-        let mut list = [0; 3];
-        for (beyond, [a, b]) in list.iter_mut().zip(edges(triangle)) {
-            let Some(&other) = along.get(&[b, a]) else {
-                let (a, b) = ends([a, b]);
-                return Err(SurfaceError::Open(a, b));
-            };
-            *beyond = other;
-        }
-        beyond.push(list);
-    }
-    Ok(beyond)
+    let beyond = |[a, b]: [u32; 2]| along.get(&[b, a]).copied().ok_or_else(|| SurfaceError::Open(place(a), place(b)));
+    let around = |&triangle: &[u32; 3]| {
+        let [one, other, last] = edges(triangle);
+        Ok([beyond(one)?, beyond(other)?, beyond(last)?])
+    };
+    triangles.iter().map(around).collect()
 }
 
 /// A point where two triangles cross, for the crossing triangles with the smallest numbers. Triangles that only touch do not cross.
 pub fn crossing(vertices: &[Vector3<f64>], triangles: &[[u32; 3]], tree: &Tree) -> Option<Vector3<f64>> {
-    for (i, &one) in triangles.iter().enumerate() {
+    triangles.iter().enumerate().find_map(|(i, &one)| {
         let mut found: Option<(usize, Vector3<f64>)> = None;
         tree.meeting(tree.of(i), |k| {
-            let before = found.as_ref().is_none_or(|(other, _)| k < *other);
-            if k > i && before {
+            if k > i && found.is_none_or(|(first, _)| k < first) {
                 let other = triangles[k];
                 let at = pierced(vertices, one, other).or_else(|| pierced(vertices, other, one));
                 found = at.map(|at| (k, at)).or(found);
             }
         });
-        if let Some((_, at)) = found {
-            return Some(at);
-        }
-    }
-    None
+        found.map(|(_, at)| at)
+    })
 }
 
 /// The largest error allowed in the winding number of the other parts around a part. Where parts touch, the error is ½.
@@ -134,7 +119,7 @@ pub fn nested(vertices: &[Vector3<f64>], triangles: &[[u32; 3]], neighbours: &[[
         return None;
     }
     let corners = |i: usize| triangles[i].map(|corner| vertices[corner as usize]);
-    let bounds: Vec<Bounds> = parts.iter().map(|part| Bounds::of(part.iter().flat_map(|&i| corners(i)))).collect();
+    let bounds: Vec<Bounds<3>> = parts.iter().map(|part| Bounds::of(part.iter().flat_map(|&i| corners(i)))).collect();
     parts.iter().enumerate().find_map(|(own, part)| {
         let x = corners(part[0])[0];
         let volume: f64 =

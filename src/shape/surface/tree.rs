@@ -1,71 +1,45 @@
 //! A tree of bounding boxes of triangles, to find the triangles near a point or a box.
 
+use crate::shape::bounds::Bounds;
 use nalgebra::Vector3;
 
 /// Largest number of triangles in a leaf.
 const LEAF: usize = 4;
 
-/// An axis-parallel box, by its lower and its upper corner.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Bounds(pub Vector3<f64>, pub Vector3<f64>);
-
-impl Bounds {
-    pub fn of(points: impl Iterator<Item = Vector3<f64>>) -> Self {
-        let nothing = Self(Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
-        points.fold(nothing, |all, x| Self(all.0.inf(&x), all.1.sup(&x)))
-    }
-
-    fn and(self, other: Self) -> Self {
-        Self(self.0.inf(&other.0), self.1.sup(&other.1))
-    }
-
-    pub fn meets(&self, other: &Self) -> bool {
-        (0..3).all(|k| self.0[k] <= other.1[k] && other.0[k] <= self.1[k])
-    }
-
-    /// The squared distance of a point from the box, 0 inside.
-    pub fn squared_distance(&self, x: &Vector3<f64>) -> f64 {
-        (x - x.sup(&self.0).inf(&self.1)).norm_squared()
-    }
-}
-
-/// A node: its two halves, or triangles.
+/// A node: two halves, or a leaf of triangles.
 #[derive(Clone, Debug, PartialEq)]
-enum Node {
-    Halves(Box<[(Bounds, Node); 2]>),
-    Leaf(Vec<u32>),
+struct Node {
+    bounds: Bounds<3>,
+    halves: Vec<Node>,
+    triangles: Vec<u32>,
 }
 
 /// The tree, and the bounds of each triangle.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Tree {
-    bounds: Bounds,
     root: Node,
-    triangles: Vec<Bounds>,
+    triangles: Vec<Bounds<3>>,
 }
 
 impl Tree {
-    pub fn new(triangles: Vec<Bounds>) -> Self {
+    pub fn new(triangles: Vec<Bounds<3>>) -> Self {
         let mut all: Vec<u32> = (0..triangles.len() as u32).collect();
-        let (bounds, root) = grown(&mut all, &triangles);
-        Self { bounds, root, triangles }
+        Self { root: Node::new(&mut all, &triangles), triangles }
     }
 
     /// The bounds of a triangle.
-    pub fn of(&self, triangle: usize) -> &Bounds {
+    pub fn of(&self, triangle: usize) -> &Bounds<3> {
         &self.triangles[triangle]
     }
 
     /// Visits the triangles whose bounds meet a box.
-    pub fn meeting(&self, bounds: &Bounds, mut visit: impl FnMut(usize)) {
-        let mut open = vec![(&self.bounds, &self.root)];
-        while let Some((around, node)) = open.pop() {
-            match node {
-                _ if !around.meets(bounds) => {}
-                Node::Halves(halves) => open.extend(halves.iter().map(|half| (&half.0, &half.1))),
-                Node::Leaf(list) => {
-                    list.iter().filter(|&&i| self.of(i as usize).meets(bounds)).for_each(|&i| visit(i as usize));
-                }
+    pub fn meeting(&self, bounds: &Bounds<3>, mut visit: impl FnMut(usize)) {
+        let mut open = vec![&self.root];
+        while let Some(node) = open.pop() {
+            if node.bounds.meets(bounds) {
+                open.extend(&node.halves);
+                let triangles = node.triangles.iter().map(|&i| i as usize);
+                triangles.filter(|&i| self.of(i).meets(bounds)).for_each(&mut visit);
             }
         }
     }
@@ -78,26 +52,19 @@ impl Tree {
         mut squared_distance: impl FnMut(usize) -> (f64, T),
     ) -> Option<(f64, usize, T)> {
         let mut best: Option<(f64, usize, T)> = None;
-        let mut open = vec![(self.bounds.squared_distance(x), &self.root)];
+        let mut open = vec![(self.root.bounds.squared_distance(x), &self.root)];
         while let Some((squared, node)) = open.pop() {
             if best.as_ref().is_some_and(|best| squared > best.0) {
                 continue;
             }
-            match node {
-                Node::Halves(halves) => {
-                    let mut both = [0, 1].map(|i| (halves[i].0.squared_distance(x), &halves[i].1));
-                    // The nearer half lies on top, so it is visited first.
-                    both.sort_by(|a, b| b.0.total_cmp(&a.0));
-                    open.extend(both);
-                }
-                Node::Leaf(list) => {
-                    for &i in list {
-                        let (squared, with) = squared_distance(i as usize);
-                        let nearer = |best: &(f64, usize, T)| (squared, i as usize) < (best.0, best.1);
-                        if best.as_ref().is_none_or(nearer) {
-                            best = Some((squared, i as usize, with));
-                        }
-                    }
+            let first_half = open.len();
+            open.extend(node.halves.iter().map(|half| (half.bounds.squared_distance(x), half)));
+            // The nearer half lies on top, so it is visited first.
+            open[first_half..].sort_by(|a, b| b.0.total_cmp(&a.0));
+            for i in node.triangles.iter().map(|&i| i as usize) {
+                let (squared, with) = squared_distance(i);
+                if best.as_ref().is_none_or(|best| (squared, i) < (best.0, best.1)) {
+                    best = Some((squared, i, with));
                 }
             }
         }
@@ -105,17 +72,19 @@ impl Tree {
     }
 }
 
-/// Splits a list at the median of the centres, across the longest side of its bounds.
-fn grown(list: &mut [u32], triangles: &[Bounds]) -> (Bounds, Node) {
-    let of = |i: u32| triangles[i as usize];
-    let bounds = list.iter().fold(Bounds::of(std::iter::empty()), |all, &i| all.and(of(i)));
-    if list.len() <= LEAF {
-        return (bounds, Node::Leaf(list.to_vec()));
+impl Node {
+    /// The tree of a list, split at the median of the centres, across the longest side of its bounds.
+    fn new(list: &mut [u32], triangles: &[Bounds<3>]) -> Self {
+        let of = |i: u32| triangles[i as usize];
+        let bounds = Bounds::around(list.iter().map(|&i| of(i)));
+        if list.len() <= LEAF {
+            return Self { bounds, halves: Vec::new(), triangles: list.to_vec() };
+        }
+        let axis = (bounds.1 - bounds.0).imax();
+        let center = |i: u32| of(i).0[axis] + of(i).1[axis];
+        let middle = list.len() / 2;
+        list.select_nth_unstable_by(middle, |&a, &b| center(a).total_cmp(&center(b)).then(a.cmp(&b)));
+        let (left, right) = list.split_at_mut(middle);
+        Self { bounds, halves: vec![Self::new(left, triangles), Self::new(right, triangles)], triangles: Vec::new() }
     }
-    let axis = (bounds.1 - bounds.0).imax();
-    let center = |i: u32| of(i).0[axis] + of(i).1[axis];
-    let middle = list.len() / 2;
-    list.select_nth_unstable_by(middle, |&a, &b| center(a).total_cmp(&center(b)).then(a.cmp(&b)));
-    let (left, right) = list.split_at_mut(middle);
-    (bounds, Node::Halves(Box::new([grown(left, triangles), grown(right, triangles)])))
 }

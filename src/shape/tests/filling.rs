@@ -6,13 +6,12 @@ use super::*;
 fn measured<const D: usize>(grid: &Grid<D>, shape: &Shape<D>) -> (f64, Vector<f64, D>, f64, Vector<f64, D>, f64) {
     let (mut volume, mut moment, mut area) = (0.0, Vector::zeros(), 0.0);
     let (mut normals, mut flux): (Vector<f64, D>, f64) = (Vector::zeros(), 0.0);
-    let edges = Vector::repeat(grid.spacing);
     for cell in indices(grid.cells.map(u64::from)) {
-        let lower = grid.position(cell.map(|i| i as u32));
-        let (v, centroid) = shape.part(&lower, &edges, grid.spacing);
+        let of = GridBox::cell(grid, cell.map(|i| i as u32));
+        let (v, centroid) = shape.part(&of);
         volume += v;
         moment += centroid * v;
-        for facet in shape.facets(None, &lower, &edges, grid.spacing) {
+        for facet in shape.facets(None, &of) {
             area += facet.area;
             normals += facet.normal * facet.area;
             flux += facet.position.dot(&facet.normal) * facet.area / D as f64;
@@ -154,7 +153,8 @@ fn a_region_cuts_the_surface_where_it_ends() {
     let mut area = 0.0;
     for cell in indices(grid.cells.map(u64::from)) {
         let lower = grid.position(cell.map(|i| i as u32));
-        let facets = disc.facets(Some(&right.clone().into()), &lower, &vector([0.5, 0.5]), 0.5);
+        let of = GridBox { lower, edges: vector([0.5, 0.5]), spacing: 0.5 };
+        let facets = disc.facets(Some(&right.clone().into()), &of);
         area += facets.iter().map(|facet| facet.area).sum::<f64>();
     }
     // The arc beyond x = 2.3, of 2 acos(0.3/1.2).
@@ -211,7 +211,7 @@ fn points_of_a_curved_surface_integrate_polynomials() {
         let edges = Vector::repeat(0.5 * grid.spacing);
         for i in indices(grid.cells.map(|n| 2 * u64::from(n))) {
             let lower = Vector::from_fn(|k, _| grid.origin[k] + i[k] as f64 * edges[k]);
-            for point in shape.surface_points(None, &lower, &edges, grid.spacing) {
+            for point in shape.surface_points(None, &GridBox { lower, edges, spacing: grid.spacing }) {
                 of_x += point.position * point.normal.transpose() * point.area;
                 of_square += point.position[0].powi(2) * point.normal[0] * point.area;
             }
@@ -256,8 +256,9 @@ fn cells_beside_a_cut_agree_on_which_of_them_is_whole() {
         let halves = indices([2 * u64::from(cells); 2]).flat_map(|i| {
             let lower = Vector::from_fn(|k, _| i[k] as f64 * half[k]);
             // In one of the half cells no points are found.
-            plate.quadrature(&lower, &half, h, 3, 2).unwrap_or_else(|| {
-                let (volume, position) = plate.part(&lower, &half, h);
+            let of = GridBox { lower, edges: half, spacing: h };
+            plate.quadrature(&of, 3, 2).unwrap_or_else(|| {
+                let (volume, position) = plate.part(&of);
                 vec![Seed { position, volume }]
             })
         });

@@ -20,7 +20,7 @@ use bfree::grid::Grid;
 use bfree::material::{Lame, Law, Material, NeoHookean, MaterialState};
 use bfree::mechanics::loads::{self, Curve, Loads, Prescribed, Pressing, Selection, SurfaceLoad, SurfacePoint};
 use bfree::particles::{Body, Particles};
-use bfree::shape::{self, Ball, Block, Difference, Fill, Filling, Seed, Shape, fill};
+use bfree::shape::{self, Ball, Block, Difference, Fill, Filling, GridBox, Seed, Shape, fill};
 use bfree::simulation::{InitialGuess, Settings, Simulation};
 use bfree::tensor::{Tensor, Vector};
 
@@ -176,7 +176,7 @@ fn tractions<M: Motion<D>, const D: usize>(
             rest /= across;
             grid.origin[k] + at as f64 * edges[k]
         });
-        for facet in body.surface_points(Some(&around), &lower, &edges, grid.spacing) {
+        for facet in body.surface_points(Some(&around), &GridBox { lower, edges, spacing: grid.spacing }) {
             let at = MaterialState::new(state(motion, &facet.position, 1.0).displacement_gradient);
             let traction = at.f * law.stress(&at) * facet.normal;
             let point = SurfacePoint { particle: particles.len(), normal: facet.normal, area: facet.area };
