@@ -81,7 +81,7 @@ pub fn check_columns_on(
         f(k, h)
     };
     let mut measured = match measure(claimed, value, ladder, &mut f) {
-        Ok(measured) => Measured { calls: calls.get(), ..measured },
+        Ok(measured) => measured,
         Err(CallFailed(sentence)) => return failed(name, claimed, value.len(), claimed.columns, sentence, calls.get()),
     };
     let finding = judge(name, claimed, &measured);
@@ -102,8 +102,21 @@ pub fn check_columns_on(
     judge(name, claimed, &measured)
 }
 
-/// Measures the noise along the greatest column, and the derivatives along all.
-pub(super) fn measure(claimed: &Matrix, value: &[f64], ladder: Ladder, f: Columns<'_>) -> Result<Measured, CallFailed> {
+/// Measures the noise along the greatest column of the claimed tangent, and the derivatives along all. The calls are counted.
+///
+/// # Errors
+/// All calls of a column failed, or a response has another size than `value`.
+pub fn measure(
+    claimed: &Matrix,
+    value: &[f64],
+    ladder: Ladder,
+    f: &mut dyn FnMut(usize, f64) -> Result<Vec<f64>, CallFailed>,
+) -> Result<Measured, CallFailed> {
+    let mut calls = 0;
+    let mut f = |k: usize, h: f64| {
+        calls += 1;
+        f(k, h)
+    };
     let size = |k: &usize| greatest(&column(claimed, *k));
     let greatest_column = (0..claimed.columns).max_by(|a, b| size(a).total_cmp(&size(b))).unwrap_or(0);
     let along = noise(&mut |h| f(greatest_column, h), value, ladder)?;
@@ -114,7 +127,8 @@ pub(super) fn measure(claimed: &Matrix, value: &[f64], ladder: Ladder, f: Column
                 .map_err(|CallFailed(sentence)| CallFailed(format!("Column {k}: {sentence}")))
         })
         .collect();
-    Ok(Measured { value: value.to_vec(), noise, columns: columns?, jump: None, calls: 0 })
+    let columns = columns?;
+    Ok(Measured { value: value.to_vec(), noise, columns, jump: None, calls })
 }
 
 /// Whether the tangent deviates so little that a loose local iteration may explain it.

@@ -72,7 +72,7 @@ pub fn check_directions(
         measure(&claimed, value, ladder, &mut |k, h| f(&all[k], h))
     });
     let mut measured = match measured {
-        Ok(measured) => Measured { calls: calls.get(), ..measured },
+        Ok(measured) => measured,
         Err(CallFailed(sentence)) => return failed(name, &claimed, value.len(), count, sentence, calls.get()),
     };
     let mut finding = judge(name, &claimed, &measured);

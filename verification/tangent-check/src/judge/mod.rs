@@ -6,7 +6,7 @@ mod directions;
 mod evidence;
 mod loose;
 
-pub use check::{Loading, check_columns, check_columns_on};
+pub use check::{Loading, check_columns, check_columns_on, measure};
 pub use directions::{Directions, check_directions};
 pub use loose::Jump;
 
