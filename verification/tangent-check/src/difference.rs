@@ -40,6 +40,9 @@ const PATIENCE: f64 = 32.0;
 /// The ladder does not stop for lack of progress before the errors are below this multiple of the noise 2 u / h.
 const NEAR: f64 = 100.0;
 
+/// The perturbation, over h₀, of the last look: near √ε for h₀ = 0.04.
+const END: f64 = 5e-7;
+
 /// Derivatives that differ by more than this number of errors differ.
 pub(crate) const ERRORS: f64 = 10.0;
 
@@ -49,7 +52,7 @@ const SPACINGS: [f64; 3] = [2.5e-9, 2.5e-7, 2.5e-5];
 /// The points of a table that measures the noise.
 const POINTS: usize = 6;
 
-/// A table whose fifth differences are below this multiple of the third shows a smooth function, not noise.
+/// A table whose differences fall to this part from order to order shows a smooth function, not noise.
 const DECAY: f64 = 0.25;
 
 /// The perturbations h_i = h₀ r⁻ⁱ.
@@ -67,14 +70,14 @@ pub struct Ladder {
 impl Default for Ladder {
     /// 0.04, 0.02, 0.01, … to 2e-8 in 22 levels.
     fn default() -> Self {
-        Self { first: 0.04, ratio: 2.0, levels: 22 }
+        Self { first: 0.04, ratio: 2.0, levels: 21 }
     }
 }
 
 impl Ladder {
     /// From 0.04 to 1e-7 in 15 levels: at most 30 calls, and half to one digit less than the default.
     pub fn coarse() -> Self {
-        Self { first: 0.04, ratio: 2.5, levels: 15 }
+        Self { first: 0.04, ratio: 2.5, levels: 14 }
     }
 
     /// The perturbations from the greatest to the smallest.
@@ -144,6 +147,9 @@ pub struct Derivative {
     pub forward: Estimate,
     /// D₋, from values at h < 0.
     pub backward: Estimate,
+    /// Whether the central difference at a perturbation near √ε contradicts the estimates. Then a kink may be nearer to 0 than they see:
+    /// in a direction almost tangential to a yield surface, both sides may lie beyond it.
+    pub contradicted: bool,
     /// Calls of the function.
     pub calls: usize,
 }
@@ -201,39 +207,104 @@ pub fn derivative(
     if noise.len() != size {
         return Err(sizes(noise.len(), size));
     }
-    let mut central = Tableau::new(ladder.ratio * ladder.ratio, CENTRAL_ORDER, size);
-    let mut forward = Tableau::new(ladder.ratio, SIDE_ORDER, size);
-    let mut backward = Tableau::new(ladder.ratio, SIDE_ORDER, size);
-    let mut failure = None;
-    let mut calls = 0;
+    let mut run = Run {
+        f,
+        value_at_zero,
+        noise,
+        central: Tableau::new(ladder.ratio * ladder.ratio, CENTRAL_ORDER, size),
+        sides: [1.0, -1.0].map(|sign| (sign, Tableau::new(ladder.ratio, SIDE_ORDER, size))),
+        failure: None,
+        calls: 0,
+    };
     for h in ladder.perturbations() {
-        calls += 2;
-        let floor: Vec<f64> = noise.iter().map(|u| 2.0 * u / h).collect();
-        let [plus, minus] = [finite(f(h), size), finite(f(-h), size)];
-        match (&plus, &minus) {
-            (Ok(plus), Ok(minus)) => central.add(h, quotient(plus, minus, 2.0 * h), &floor),
-            _ => central.row.clear(),
-        }
-        for (side, value, sign) in [(&mut forward, plus, 1.0), (&mut backward, minus, -1.0)] {
-            match value {
-                Ok(value) => side.add(h, quotient(&value, value_at_zero, sign * h), &floor),
-                Err(Refused::Size(failed)) => return Err(failed),
-                Err(Refused::Level(failed)) => {
-                    side.row.clear();
-                    failure = Some(failed);
-                }
-            }
-        }
-        let tableaux = [&central, &forward, &backward];
-        let settled = tableaux.iter().all(|tableau| tableau.within(ladder.ratio, &floor));
-        let stalled = tableaux.iter().all(|tableau| tableau.halved >= PATIENCE * h && tableau.within(NEAR, &floor));
-        if settled || (stalled && ladder.first >= FIRST_STOP * h) {
+        run.level(h)?;
+        if run.finished(h, ladder) {
             break;
         }
     }
-    match failure {
-        Some(failure) if forward.is_empty() && backward.is_empty() => Err(failure),
-        _ => Ok(Derivative { central: central.best, forward: forward.best, backward: backward.best, calls }),
+    run.result(END * ladder.first)
+}
+
+/// A measurement on its way down the ladder.
+struct Run<'a> {
+    f: &'a mut dyn FnMut(f64) -> Result<Vec<f64>, CallFailed>,
+    value_at_zero: &'a [f64],
+    noise: &'a [f64],
+    central: Tableau,
+    /// The sign of h, and the tableau of that side.
+    sides: [(f64, Tableau); 2],
+    failure: Option<CallFailed>,
+    calls: usize,
+}
+
+impl Run<'_> {
+    /// The value at h, or `None` if the call failed.
+    fn call(&mut self, h: f64) -> Result<Option<Vec<f64>>, CallFailed> {
+        self.calls += 1;
+        match finite((self.f)(h), self.value_at_zero.len()) {
+            Ok(value) => Ok(Some(value)),
+            Err(Refused::Size(failed)) => Err(failed),
+            Err(Refused::Level(failed)) => {
+                self.failure = Some(failed);
+                Ok(None)
+            }
+        }
+    }
+
+    /// The noise 2 u / h of a difference quotient.
+    fn floor(&self, h: f64) -> Vec<f64> {
+        self.noise.iter().map(|u| 2.0 * u / h).collect()
+    }
+
+    /// Adds the level h to all tableaux.
+    fn level(&mut self, h: f64) -> Result<(), CallFailed> {
+        let floor = self.floor(h);
+        let values = [self.call(h)?, self.call(-h)?];
+        match &values {
+            [Some(plus), Some(minus)] => self.central.add(h, quotient(plus, minus, 2.0 * h), &floor),
+            _ => self.central.row.clear(),
+        }
+        for ((sign, side), value) in self.sides.iter_mut().zip(values) {
+            match value {
+                Some(value) => side.add(h, quotient(&value, self.value_at_zero, *sign * h), &floor),
+                None => side.row.clear(),
+            }
+        }
+        Ok(())
+    }
+
+    fn tableaux(&self) -> [&Tableau; 3] {
+        [&self.central, &self.sides[0].1, &self.sides[1].1]
+    }
+
+    /// Whether further levels are in vain, because the noise exceeds the errors, or because the errors do not fall any more.
+    fn finished(&self, h: f64, ladder: Ladder) -> bool {
+        let floor = self.floor(h);
+        let stalled = |tableau: &Tableau| tableau.halved >= PATIENCE * h && tableau.within(NEAR, &floor);
+        self.tableaux().iter().all(|tableau| tableau.within(ladder.ratio, &floor))
+            || (ladder.first >= FIRST_STOP * h && self.tableaux().iter().all(|tableau| stalled(tableau)))
+    }
+
+    /// Whether the central difference at h contradicts what was measured at greater perturbations.
+    fn contradicted(&mut self, h: f64, measured: &Derivative) -> Result<bool, CallFailed> {
+        if measured.has_kink() {
+            return Ok(false);
+        }
+        let [Some(plus), Some(minus)] = [self.call(h)?, self.call(-h)?] else { return Ok(false) };
+        let last = Estimate { value: quotient(&plus, &minus, 2.0 * h), error: self.floor(h) };
+        Ok(last.disagrees(&measured.best()))
+    }
+
+    /// The derivative, after a last look at the perturbation h.
+    fn result(mut self, h: f64) -> Result<Derivative, CallFailed> {
+        if let Some(failure) = self.failure.take_if(|_| self.sides.iter().all(|(_, side)| side.is_empty())) {
+            return Err(failure);
+        }
+        let [central, forward, backward] = self.tableaux().map(|tableau| tableau.best.clone());
+        let mut measured = Derivative { central, forward, backward, contradicted: false, calls: 0 };
+        measured.contradicted = self.contradicted(h, &measured)?;
+        measured.calls = self.calls;
+        Ok(measured)
     }
 }
 
@@ -318,37 +389,39 @@ fn sizes(has: usize, expected: usize) -> CallFailed {
 /// The noise of each component of `f` near 0: the standard deviation of its round-off, in the unit of `f`.
 ///
 /// The k-th differences Δᵏf of six values at equal, tiny spacing contain nothing but noise, with σ² = (k!)²/(2k)! mean((Δᵏf)²).
-/// The greatest σ over k = 3, 4, 5 and over the spacings 1e-10, 1e-8 and 1e-6 (for h₀ = 0.04) is taken, then the least over both sides
-/// of 0, because a kink spoils one side. The result is at least ε max|f(0)|. It costs 30 calls.
+/// The greatest σ over k = 3, 4, 5 is taken, then the smaller one of both sides of 0, because a kink spoils one side, and then the greatest
+/// over the spacings 1e-10, 1e-8 and 1e-6 (for h₀ = 0.04). The result is at least ε |f(0)|. It costs 30 calls.
+///
+/// `f(t, h)` is the value at h for the spacing number t = 0, 1, 2. Each may have a direction of its own: round-off differs from one to the
+/// other, since h adds to a number of another size.
 ///
 /// # Errors
 /// No table on either side could be filled, `f` changed the number of its components, or the ladder is not valid.
 pub fn noise(
-    f: &mut dyn FnMut(f64) -> Result<Vec<f64>, CallFailed>,
+    f: &mut dyn FnMut(usize, f64) -> Result<Vec<f64>, CallFailed>,
     value_at_zero: &[f64],
     ladder: Ladder,
 ) -> Result<Vec<f64>, CallFailed> {
     ladder.check()?;
     let mut failure = None;
-    let mut least: Option<Vec<f64>> = None;
-    for side in [1.0, -1.0] {
-        let mut greatest: Option<Vec<f64>> = None;
-        for spacing in SPACINGS {
-            match table_noise(f, value_at_zero, side * spacing * ladder.first) {
-                Ok(noise) => greatest = Some(combine(greatest, noise, f64::max)),
+    let mut greatest: Option<Vec<f64>> = None;
+    for (t, spacing) in SPACINGS.into_iter().enumerate() {
+        let mut least: Option<Vec<f64>> = None;
+        for side in [1.0, -1.0] {
+            match table_noise(&mut |h| f(t, h), value_at_zero, side * spacing * ladder.first) {
+                Ok(noise) => least = Some(combine(least, noise, f64::min)),
                 Err(Refused::Size(failed)) => return Err(failed),
                 Err(Refused::Level(failed)) => failure = Some(failed),
             }
         }
-        if let Some(noise) = greatest {
-            least = Some(combine(least, noise, f64::min));
+        if let Some(noise) = least {
+            greatest = Some(combine(greatest, noise, f64::max));
         }
     }
-    let floor = f64::EPSILON * value_at_zero.iter().fold(0.0_f64, |greatest, value| greatest.max(value.abs()));
-    match (least, failure) {
-        (Some(noise), _) => Ok(noise.into_iter().map(|noise| noise.max(floor)).collect()),
+    let floor = value_at_zero.iter().map(|value| f64::EPSILON * value.abs()).collect();
+    match (greatest, failure) {
         (None, Some(failure)) => Err(failure),
-        (None, None) => Ok(vec![floor; value_at_zero.len()]),
+        (noise, _) => Ok(combine(noise, floor, f64::max)),
     }
 }
 
@@ -387,10 +460,13 @@ fn table_noise(
         };
         orders.push((0..size).map(deviation).collect());
     }
-    let [.., third, fourth, fifth] = &orders[..] else { return Ok(vec![0.0; size]) };
+    // A smooth function shows in the lower differences: each falls far below the one before. What does not fall is noise.
     let length = |values: &[f64]| values.iter().map(|value| value * value).sum::<f64>().sqrt();
-    if length(fifth) < DECAY * length(third) {
-        return Ok(vec![0.0; size]);
-    }
-    Ok((0..size).map(|i| third[i].max(fourth[i]).max(fifth[i])).collect())
+    let falls = |higher: &[f64], lower: &[f64]| length(higher) < DECAY * length(lower);
+    let [.., third, fourth, fifth] = &orders[..] else { return Ok(vec![0.0; size]) };
+    Ok(match (falls(fourth, third), falls(fifth, fourth)) {
+        (true, true) => vec![0.0; size],
+        (true, false) => (0..size).map(|i| fourth[i].max(fifth[i])).collect(),
+        (false, _) => (0..size).map(|i| third[i].max(fourth[i]).max(fifth[i])).collect(),
+    })
 }
