@@ -37,7 +37,9 @@ pub fn case(law: &'static str, number: usize) -> Case {
     let index = LAWS.iter().position(|name| *name == law).unwrap_or(LAWS.len());
     let mut random = Random(1 + 1000 * index as u64 + 7_000_003 * number as u64);
     // A third of the states of plastic laws lie next to a kink.
-    let kink = (number % 3 == 0).then(|| random.logarithmic(1e-12, 1e-2) * if number % 2 == 0 { 1.0 } else { -1.0 });
+    let kink = number
+        .is_multiple_of(3)
+        .then(|| random.logarithmic(1e-12, 1e-2) * if number.is_multiple_of(2) { 1.0 } else { -1.0 });
     match law {
         "neo-Hookean, exp(h B) F" => kirchhoff(law, deformation(&mut random)),
         "neo-Hookean, P(F)" => neo_hookean(law, deformation(&mut random)),

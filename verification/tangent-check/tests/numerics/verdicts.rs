@@ -6,9 +6,14 @@ use crate::tensor::{PAIRS, Random, combine, norm};
 use crate::{check, states};
 use tangent_check::difference::Ladder;
 use tangent_check::finding::{Finding, Reason, Verdict};
-use tangent_check::judge::{Directions, Loading, check_columns, check_columns_on, check_directions, judge_exact};
+use tangent_check::judge::{
+    Directions, Loading, Product, check_columns, check_columns_on, check_directions, judge_exact,
+};
 use tangent_check::law::CallFailed;
 use tangent_check::matrix::Matrix;
+
+/// The response to a perturbation h of column k.
+type Columns<'a> = dyn FnMut(usize, f64) -> Result<Vec<f64>, CallFailed> + 'a;
 
 /// The check of a J2 state whose local iteration stops at `tolerance`, with its loading, after one entry was multiplied by `factor`.
 fn check_loose(number: usize, tolerance: f64, factor: f64) -> Finding {
@@ -110,9 +115,7 @@ fn refused_perturbations_are_skipped() {
         true => Err(CallFailed("refused".into())),
         false => Ok((case.respond)(k, h)),
     };
-    let check = |f: &mut dyn FnMut(usize, f64) -> Result<Vec<f64>, CallFailed>| {
-        check_columns("refusing", &case.claimed, &case.value, f)
-    };
+    let check = |f: &mut Columns<'_>| check_columns("refusing", &case.claimed, &case.value, f);
     assert_eq!(check(&mut |k, h| answer(k, h, h.abs() > 0.011)).verdict, Verdict::Consistent);
     assert_eq!(check(&mut |k, h| answer(k, h, h > 0.0)).verdict, Verdict::Consistent);
     assert_eq!(check(&mut |k, h| answer(k, h, h > 1e-3 && h < 8e-3)).verdict, Verdict::Consistent);
@@ -125,7 +128,7 @@ fn refused_perturbations_are_skipped() {
 #[test]
 fn inputs_without_sense_are_not_checked() {
     let case = example();
-    let reason = |claimed: &Matrix, value: &[f64], f: &mut dyn FnMut(usize, f64) -> Result<Vec<f64>, CallFailed>| {
+    let reason = |claimed: &Matrix, value: &[f64], f: &mut Columns<'_>| {
         let finding = check_columns("no sense", claimed, value, f);
         assert_eq!(finding.verdict, Verdict::NotChecked);
         finding.reason
@@ -213,11 +216,14 @@ fn directions_find_the_wrong_entry() {
 #[test]
 fn products_without_sense_are_not_checked() {
     let mut f = |w: &[f64], h: f64| Ok(w.iter().map(|w| h * w).collect());
-    let mut check = |product: &mut dyn FnMut(&[f64]) -> Result<Vec<f64>, CallFailed>| {
-        check_directions("no sense", 3, &[0.0; 3], product, &mut f, Directions::default())
-    };
+    let mut check =
+        |product: &mut Product<'_>| check_directions("no sense", 3, &[0.0; 3], product, &mut f, Directions::default());
     assert_eq!(check(&mut |w| Ok(w.to_vec())).verdict, Verdict::Consistent);
+    let mut nothing = |_: &[f64]| Ok(vec![]);
+    let none = Directions { count: 0, ..Directions::default() };
     for finding in [
+        check_directions("no unknowns", 0, &[], &mut nothing, &mut |_, _| Ok(vec![]), Directions::default()),
+        check_directions("no directions", 3, &[0.0; 3], &mut nothing, &mut |_, _| Ok(vec![0.0; 3]), none),
         check(&mut |w| Ok(w[1..].to_vec())),
         check(&mut |_| Ok(vec![f64::NAN; 3])),
         check(&mut |_| Err(CallFailed("refused".into()))),
