@@ -1,1 +1,0 @@
-//! Verdicts: a claimed tangent beside the measured one, and the negative control.

@@ -1,0 +1,159 @@
+//! The check of a tangent with many unknowns, through products with random directions.
+
+use super::check::{Loading, asks_for_jump, jump_of_loading, measure};
+use super::{Entry, Finding, Matrix, Measured, Verdict, failed, greatest, judge};
+use crate::difference::{Ladder, derivative};
+use crate::law::CallFailed;
+use std::cell::Cell;
+
+/// The directions of a check.
+pub struct Directions<'a> {
+    /// The number of random directions.
+    pub count: usize,
+    /// The seed of the random numbers.
+    pub seed: u64,
+    /// The perturbations h of u + h w, where the entries of w lie in (−1, 1).
+    pub ladder: Ladder,
+    /// The step that led to the state.
+    pub loading: Option<Loading<'a>>,
+}
+
+impl Default for Directions<'_> {
+    fn default() -> Self {
+        Self { count: 3, seed: 1, ladder: Ladder::default(), loading: None }
+    }
+}
+
+/// The claimed product J w.
+type Product<'a> = &'a mut dyn FnMut(&[f64]) -> Result<Vec<f64>, CallFailed>;
+
+/// The response at u + h w.
+type Residual<'a> = &'a mut dyn FnMut(&[f64], f64) -> Result<Vec<f64>, CallFailed>;
+
+/// Checks a tangent with many unknowns along random directions w: the claimed `product(w)` = J w, beside the derivative of `f(w, h)`, which
+/// is the response at u + h w.
+///
+/// The columns of the finding are the directions, and the control spoils entries of J w. If the tangent is wrong, halving of a direction
+/// finds the unknown whose column deviates in the worst row. Then `worst` is that entry of J: its `column` is the number of the unknown.
+/// Rows with different units should be checked apart, because the errors are relative to the greatest entry.
+///
+/// ```
+/// use tangent_check::finding::Verdict;
+/// use tangent_check::judge::{Directions, check_directions};
+///
+/// // r_i = u_i³ at u = 1, with one entry of the tangent 1 % too large
+/// let mut product = |w: &[f64]| Ok(w.iter().enumerate().map(|(i, w)| if i == 7 { 3.03 * w } else { 3.0 * w }).collect());
+/// let mut f = |w: &[f64], h: f64| Ok(w.iter().map(|w| (1.0 + h * w).powi(3)).collect());
+/// let finding = check_directions("cubes", 20, &[1.0; 20], &mut product, &mut f, Directions::default());
+/// assert_eq!(finding.verdict, Verdict::Wrong);
+/// let worst = finding.worst.unwrap();
+/// assert_eq!((worst.row, worst.column), (7, 7));
+/// assert!((worst.claimed - 3.03).abs() < 1e-12 && (worst.measured - 3.0).abs() < 1e-9);
+/// ```
+pub fn check_directions(
+    name: &str,
+    unknowns: usize,
+    value: &[f64],
+    product: &mut dyn FnMut(&[f64]) -> Result<Vec<f64>, CallFailed>,
+    f: &mut dyn FnMut(&[f64], f64) -> Result<Vec<f64>, CallFailed>,
+    directions: Directions<'_>,
+) -> Finding {
+    let Directions { count, seed, ladder, loading } = directions;
+    let calls = Cell::new(0);
+    let mut f = |w: &[f64], h: f64| {
+        calls.set(calls.get() + 1);
+        f(w, h)
+    };
+    let mut random = Random(seed);
+    let all: Vec<Vec<f64>> = (0..count).map(|_| (0..unknowns).map(|_| random.signed()).collect()).collect();
+    let mut claimed = Matrix::zeros(value.len(), count);
+    let measured = claim(&mut claimed, &all, product).and_then(|()| {
+        finite(value, value.len())?;
+        measure(&claimed, value, ladder, &mut |k, h| f(&all[k], h))
+    });
+    let mut measured = match measured {
+        Ok(measured) => Measured { calls: calls.get(), ..measured },
+        Err(CallFailed(sentence)) => return failed(name, &claimed, value.len(), count, sentence, calls.get()),
+    };
+    let mut finding = judge(name, &claimed, &measured);
+    if let (true, Some(loading)) = (asks_for_jump(&finding), loading) {
+        let mut respond = |part: f64| {
+            calls.set(calls.get() + 1);
+            (loading.respond)(part)
+        };
+        measured.jump =
+            jump_of_loading(&claimed, &measured, &mut Loading { size: loading.size, respond: &mut respond });
+        measured.calls = calls.get();
+        finding = judge(name, &claimed, &measured);
+    }
+    if let (Verdict::Wrong, Some(worst)) = (finding.verdict, finding.worst) {
+        let found = locate(&all[worst.column], worst.row, &measured, ladder, product, &mut f);
+        finding.worst = found.or(finding.worst);
+        finding.calls = calls.get();
+    }
+    finding
+}
+
+/// Fills in the claimed products.
+fn claim(claimed: &mut Matrix, directions: &[Vec<f64>], product: Product<'_>) -> Result<(), CallFailed> {
+    for (k, w) in directions.iter().enumerate() {
+        let values = product(w)?;
+        finite(&values, claimed.rows)?;
+        for (i, value) in values.into_iter().enumerate() {
+            claimed[(i, k)] = value;
+        }
+    }
+    Ok(())
+}
+
+fn finite(values: &[f64], size: usize) -> Result<(), CallFailed> {
+    if values.len() != size {
+        return Err(CallFailed(format!("The product J w has {} entries, but the response has {size}.", values.len())));
+    }
+    match values.iter().position(|value| !value.is_finite()) {
+        Some(i) => Err(CallFailed(format!("Entry {i} of the response or of the product J w is {}.", values[i]))),
+        None => Ok(()),
+    }
+}
+
+/// Finds the unknown whose column deviates in a row, by halving the direction.
+fn locate(
+    w: &[f64],
+    row: usize,
+    measured: &Measured,
+    ladder: Ladder,
+    product: Product<'_>,
+    f: Residual<'_>,
+) -> Option<Entry> {
+    let mut entry = |w: &[f64], column: usize| {
+        let claimed = *product(w).ok()?.get(row)?;
+        let best = derivative(&mut |h| f(w, h), &measured.value, &measured.noise, ladder).ok()?.best();
+        Some(Entry { row, column, claimed, measured: best.value[row], error: best.error[row] })
+    };
+    let (mut first, mut end) = (0, w.len());
+    while end - first > 1 {
+        let middle = first + (end - first) / 2;
+        let half: Vec<f64> = (0..w.len()).map(|j| if (first..middle).contains(&j) { w[j] } else { 0.0 }).collect();
+        if deviates(&entry(&half, first)?) { end = middle } else { first = middle }
+    }
+    let unit: Vec<f64> = (0..w.len()).map(|j| if j == first { 1.0 } else { 0.0 }).collect();
+    entry(&unit, first).filter(deviates)
+}
+
+fn deviates(entry: &Entry) -> bool {
+    entry.deviation() > super::ERRORS * entry.error + 1e3 * f64::EPSILON * greatest(&[entry.claimed, entry.measured])
+}
+
+/// SplitMix64 (Steele, Lea and Flood 2014).
+struct Random(u64);
+
+impl Random {
+    /// A number in (−1, 1).
+    fn signed(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+    }
+}

@@ -1,0 +1,138 @@
+//! What the measurements say about one column of a claimed tangent.
+
+use super::{Derivative, ERRORS, Entry, Estimate, Matrix, Measured, NOISY, greatest, loose};
+
+/// The round-off of a claimed tangent over ‖C‖, in units of ε.
+const ROUND_OFF: f64 = 4.0;
+
+/// The verdict over one column.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum ColumnVerdict {
+    Consistent,
+    Inexact,
+    Kink,
+    Wrong,
+}
+
+/// The measurements of one column.
+pub(super) struct Column {
+    /// The derivatives that the column may match: the best, or those to both sides of a kink that are sharp.
+    accepted: Vec<Estimate>,
+    /// The derivatives to both sides. While one of them could be the claimed column, a kink cannot be excluded.
+    sides: Vec<Estimate>,
+    kink: bool,
+}
+
+/// The measured tangent in the form in which columns are judged.
+pub(super) struct Evidence {
+    /// The columns.
+    pub columns: Vec<Column>,
+    /// ‖C‖, the greatest entry of the measured tangent.
+    pub scale: f64,
+    /// The accepted deviation in errors.
+    errors: f64,
+    /// The deviation that a loose local iteration explains; 0 without a trace of one.
+    explained: f64,
+}
+
+impl Evidence {
+    /// The evidence of differences.
+    pub fn of(measured: &Measured) -> Self {
+        let mut columns: Vec<Column> = measured.columns.iter().map(Column::of).collect();
+        let values = columns.iter().flat_map(|column| &column.accepted).flat_map(|estimate| &estimate.value);
+        let scale = values.filter(|value| value.is_finite()).fold(0.0_f64, |greatest, value| greatest.max(value.abs()));
+        for Column { accepted, sides, kink } in &mut columns {
+            for error in accepted.iter_mut().chain(&mut *sides).flat_map(|estimate| &mut estimate.error) {
+                *error += ROUND_OFF * f64::EPSILON * scale;
+            }
+            if *kink {
+                accepted.retain(|side| side.greatest_error() <= NOISY * scale);
+            }
+        }
+        let explained = measured.jump.map_or(0.0, |jump| jump.slope().min(loose::LOOSE * scale));
+        Self { columns, scale, errors: ERRORS, explained }
+    }
+
+    /// The evidence of an exact tangent with round-off `bound`, relative to its greatest entry.
+    pub fn exact(exact: &Matrix, bound: f64) -> Self {
+        let scale = exact.greatest();
+        let error = vec![bound * scale; exact.rows];
+        let column = |k| Estimate { value: super::column(exact, k), error: error.clone() };
+        let columns =
+            (0..exact.columns).map(|k| Column { accepted: vec![column(k)], sides: vec![], kink: false }).collect();
+        Self { columns, scale, errors: 1.0, explained: 0.0 }
+    }
+
+    /// ‖C‖; of the claimed tangent, if the measured one is zero.
+    pub fn scale_for(&self, claimed: &Matrix) -> f64 {
+        if self.scale > 0.0 { self.scale } else { claimed.greatest() }
+    }
+
+    /// The verdict over column `k`, if the law claims `claimed`.
+    pub fn verdict(&self, k: usize, claimed: &[f64]) -> ColumnVerdict {
+        let Column { accepted, sides, kink } = &self.columns[k];
+        let any =
+            |estimates: &[Estimate], explained| estimates.iter().any(|side| self.matches(side, claimed, explained));
+        if any(accepted, 0.0) {
+            ColumnVerdict::Consistent
+        } else if any(accepted, self.explained) {
+            ColumnVerdict::Inexact
+        } else if *kink || any(sides, 0.0) {
+            ColumnVerdict::Kink
+        } else {
+            ColumnVerdict::Wrong
+        }
+    }
+
+    /// Whether no entry deviates by more than its error allows, or than `explained`.
+    fn matches(&self, side: &Estimate, claimed: &[f64], explained: f64) -> bool {
+        let mut entries = claimed.iter().zip(side.value.iter().zip(&side.error));
+        // An entry that could not be measured has an infinite error, and deviates by NaN, which is not greater.
+        !entries.any(|(c, (d, e))| (c - d).abs() > (self.errors * e).max(explained))
+    }
+
+    /// The estimate of column `k` from which the claimed column deviates least, in errors.
+    pub fn nearest(&self, k: usize, claimed: &[f64]) -> Estimate {
+        let excess = |side: &Estimate| {
+            let entries = claimed.iter().zip(side.value.iter().zip(&side.error));
+            entries.fold(0.0_f64, |greatest, (c, (d, e))| greatest.max((c - d).abs() / e))
+        };
+        let Column { accepted, sides, .. } = &self.columns[k];
+        let candidates = if accepted.is_empty() { sides } else { accepted };
+        let nearest = candidates.iter().min_by(|a, b| excess(a).total_cmp(&excess(b)));
+        nearest.cloned().unwrap_or_else(|| Estimate::none(claimed.len()))
+    }
+
+    /// Whether an entry deviates by more than its error allows.
+    pub fn deviates(&self, entry: &Entry) -> bool {
+        entry.deviation() > self.errors * entry.error
+    }
+
+    /// Whether the claimed and the measured tangent are zero within the errors.
+    pub fn is_zero(&self, claimed: &Matrix) -> bool {
+        (0..claimed.columns).all(|k| {
+            let nearest = self.nearest(k, &super::column(claimed, k));
+            (0..claimed.rows).all(|i| {
+                let small = |value: f64| value.abs() <= self.errors * nearest.error[i];
+                small(nearest.value[i]) && small(claimed[(i, k)])
+            })
+        })
+    }
+
+    /// The greatest deviation in column `k`.
+    pub fn deviation(&self, k: usize, claimed: &Matrix) -> f64 {
+        let column = super::column(claimed, k);
+        let nearest = self.nearest(k, &column);
+        greatest(&column.iter().zip(&nearest.value).map(|(c, d)| c - d).collect::<Vec<f64>>())
+    }
+}
+
+impl Column {
+    fn of(derivative: &Derivative) -> Self {
+        let measured = |side: &&Estimate| side.value.iter().any(|value| value.is_finite());
+        let sides: Vec<Estimate> =
+            [&derivative.forward, &derivative.backward].into_iter().filter(measured).cloned().collect();
+        let kink = derivative.has_kink();
+        Self { accepted: if kink { sides.clone() } else { vec![derivative.best()] }, sides, kink }
+    }
+}
