@@ -6,7 +6,7 @@ use bfree::causes;
 use bfree::output::plot::{Look, PlotError, View, plot_frames, plot_run};
 use bfree::scene;
 use clap::{Parser, Subcommand};
-use program::{Failure, INTERRUPTED, New, Newton, Run, SceneArguments, print, tell};
+use program::{CheckLaw, Failure, INTERRUPTED, New, Newton, Run, SceneArguments, print, tell};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -27,6 +27,8 @@ enum Command {
     Check(SceneArguments),
     /// Write a starter scene and explain its keys. Without a problem, list the problems.
     New(New),
+    /// Check that the tangent of a law in a shared library (UMAT, MFront, C) is the derivative of its stress.
+    CheckLaw(CheckLaw),
     /// Show the residuals of Newton's method in each step of a scene, and the order of convergence.
     Newton(Newton),
     /// Draw energies, iterations and particles of a run as SVG and PNG. The page report.html also has a player of the snapshots.
@@ -58,12 +60,17 @@ enum Command {
 }
 
 fn main() -> ExitCode {
+    // `check-law` calls libraries in a child process, which is this program.
+    if let Some(code) = tangent_check::library::child::serve_if_asked() {
+        return code;
+    }
     let command = Arguments::parse().command;
     let json = matches!(&command, Command::Run(run) if run.tells_json());
     let result = match command {
         Command::Run(run) => run.execute(),
         Command::Check(arguments) => arguments.check(),
         Command::New(new) => new.execute(),
+        Command::CheckLaw(check) => check.execute(),
         Command::Newton(newton) => newton.execute(),
         Command::Plot { directory, movie, field, view, time, format } => {
             let mut look = Look { field, view, time, ..Look::default() };
@@ -74,6 +81,7 @@ fn main() -> ExitCode {
     };
     let (error, code) = match result {
         Ok(()) => return ExitCode::SUCCESS,
+        Err(Failure::Told(code)) => return ExitCode::from(code),
         Err(Failure::Interrupted) => return ExitCode::from(INTERRUPTED),
         Err(Failure::Scene(error)) => (error, 2),
         Err(Failure::Run(error)) => (error, 1),

@@ -1,5 +1,6 @@
 //! Shared by all commands: exit codes, standard output and standard error.
 
+mod check_law;
 mod directory;
 mod new;
 mod newton;
@@ -8,6 +9,7 @@ mod run;
 mod scene_arguments;
 mod steps;
 
+pub use check_law::CheckLaw;
 pub use new::New;
 pub use newton::Newton;
 pub use run::Run;
@@ -22,6 +24,8 @@ pub enum Failure {
     Scene(Box<dyn Error>),
     Run(Box<dyn Error>),
     Interrupted,
+    /// A verdict with this exit code, already told.
+    Told(u8),
 }
 
 /// Exit code after Ctrl-C: 128 plus the number of the signal.

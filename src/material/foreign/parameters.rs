@@ -51,6 +51,17 @@ pub enum TangentOf {
     Strain,
 }
 
+impl TangentOf {
+    /// The measure of the crate `tangent-check`.
+    pub fn measure(self) -> Measure {
+        match self {
+            Self::JaumannKirchhoff => Measure::JaumannKirchhoff,
+            Self::JaumannCauchy => Measure::JaumannCauchy,
+            Self::Strain => Measure::CauchyByStrain,
+        }
+    }
+}
+
 /// A UMAT of Abaqus/Standard.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[schemars(rename = "Umat")]
@@ -174,11 +185,7 @@ impl Outside for UmatParameters {
             library: self.library.clone(),
             kind: Kind::Umat {
                 material: self.name.clone(),
-                tangent: match self.tangent {
-                    TangentOf::JaumannKirchhoff => Measure::JaumannKirchhoff,
-                    TangentOf::JaumannCauchy => Measure::JaumannCauchy,
-                    TangentOf::Strain => Measure::CauchyByStrain,
-                },
+                tangent: self.tangent.measure(),
                 temperature: self.temperature,
             },
             properties: self.properties.clone(),

@@ -17,7 +17,7 @@
 
 mod check;
 
-pub use check::{CheckColumns, Perturbation, check_law};
+pub use check::{CheckColumns, Perturbation, check_law, check_law_by};
 
 use crate::convention::{Convention, Measure, Tensor, unit_strain};
 use crate::law::{CallFailed, Law, Response, Step};

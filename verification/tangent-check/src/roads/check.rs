@@ -4,6 +4,7 @@ use super::{History, Input, Perturbed, Road, inputs_read, probe, roads};
 use crate::convention::{Configuration, Convention, cauchy_stress};
 use crate::diagnosis::{Elsewhere, Measured, Observation, diagnose, invisible};
 use crate::finding::{Finding, Reason, Report, Verdict};
+use crate::judge::check_columns;
 use crate::law::{CallFailed, Law, Response, Step};
 use crate::matrix::Matrix;
 use crate::states::Path;
@@ -48,7 +49,12 @@ impl Travelled {
 ///
 /// Every step takes stress and internal variables from the response before. A law that reads both F and Δε is checked on both roads;
 /// the report has the findings of the road on which fewer states are wrong, and a note about the other.
-pub fn check_law(law: &mut dyn Law, paths: &[Path], seed: u64, check: &mut CheckColumns) -> Report {
+pub fn check_law(law: &mut dyn Law, paths: &[Path], seed: u64) -> Report {
+    check_law_by(law, paths, seed, &mut |name, claimed, value, f| check_columns(name, claimed, value, f))
+}
+
+/// [`check_law`] with another way to check a tangent column by column.
+pub fn check_law_by(law: &mut dyn Law, paths: &[Path], seed: u64, check: &mut CheckColumns) -> Report {
     let convention = law.convention();
     let mut report = Report {
         subject: law.name(),
