@@ -1,11 +1,11 @@
-"""Implicit finite-strain material point method: scenes, simulations, what a step solves, laws by their energy.
+"""Implicit finite-strain material point method: scenes, simulations, what a step solves, laws by their energy, and a check of tangents.
 
 Arrays are read-only and belong to the moment at which they were asked for: later steps do not change them.
 """
 
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any, final
+from typing import Any, Literal, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -287,3 +287,332 @@ class Tangent:
 
 def det(a: Any) -> Any:
     """The determinant of a 3×3 array, recorded strains too."""
+
+def check_law(
+    stress: Callable[..., Any],
+    tangent: Callable[[NDArray[np.float64]], Any] | None = None,
+    *,
+    convention: str = "piola",
+    order: str | None = None,
+    dimension: int = 3,
+    state: ArrayLike = (),
+    states: Mapping[str, ArrayLike] | Sequence[ArrayLike] | None = None,
+    dt: float = 0.1,
+    seed: int = 1,
+    name: str | None = None,
+) -> Report:
+    """Checks that the tangent of a law is the derivative of its stress, in states that are made here or given. There is no tolerance to choose.
+
+    A law that depends on the deformation alone is two functions of F, an array (3, 3): `check_law(lambda F: P(F), lambda F: A(F))`.
+    Any other law is one function of a `LawStep`, which returns (stress, tangent), or (stress, tangent, state) if it has internal variables.
+    `state` are their values at rest.
+
+    | convention | stress | tangent | order |
+    |---|---|---|---|
+    | "piola" | P | ∂P/∂F | 11, 12, 13, 21, … |
+    | "second_piola" | S | ∂S/∂E, E = (FᵀF − I)/2 | voigt |
+    | "abaqus" | σ | DDSDDE: Jaumann rate of J σ, over J | abaqus |
+    | "jaumann_cauchy" | σ | Jaumann rate of σ | abaqus |
+    | "truesdell" | σ | Truesdell rate of σ: the spatial tangent | voigt |
+    | "green_naghdi" | σ | Green–Naghdi rate of J σ, over J | abaqus |
+    | "cauchy_strain" | σ | ∂σ/∂Δε, with the rotation of the step frozen | voigt |
+    | "cauchy_gradient" | σ | ∂σ/∂F | voigt, 11, 12, 13, 21, … |
+    | "kirchhoff_gradient" | J σ | ∂(J σ)/∂F | voigt, 11, 12, 13, 21, … |
+
+    Stresses are tensors (3, 3) or vectors, tangents are tensors (3, 3, 3, 3) or matrices. Axes of length 1 at their end are left out.
+    `order` is that of the vector of a symmetric tensor: "voigt" 11, 22, 33, 23, 13, 12; "abaqus" 11, 22, 33, 12, 13, 23;
+    "explicit" 11, 22, 33, 12, 23, 13; "mfront" as abaqus with shears times √2. Shear strains are 2 ε in voigt and abaqus, ε in explicit.
+    With `dimension=2` all tensors are (2, 2), and components with index 3 are left out.
+
+    `states` are deformation gradients F, or rows of them for a path of several steps, each with a name or not. Each step takes the time
+    `dt`. Without them, twelve paths are made from `seed`: small to large strains, J from 0.5 to 2, rotations, unloading, reloading; and paths
+    around the yield surface of a law whose internal variables show one.
+
+    An exception in one state is a finding with its text. If all states fail, the first exception is raised.
+
+    Raises ValueError or TypeError for a convention or a shape that does not exist.
+    """
+
+def check_law_library(
+    library: str | os.PathLike[str],
+    *,
+    umat: bool = False,
+    mfront: str | None = None,
+    c: str | None = None,
+    properties: ArrayLike = (),
+    state: int | Mapping[str, float] | Sequence[str] = 0,
+    tangent: str = "jaumann_kirchhoff",
+    temperature: float = 0.0,
+    name: str = "BFREE",
+    external: Mapping[str, float] | None = None,
+    plane_strain: bool = False,
+    states: Mapping[str, ArrayLike] | Sequence[ArrayLike] | None = None,
+    dt: float = 0.1,
+    seed: int = 1,
+    limit: float = 5.0,
+) -> Report:
+    """`check_law` of a law in a shared library: a UMAT, an MFront behaviour `mfront`, or a law `c` with the header bfree_law.h.
+
+    The library runs in a child process: a crash, an endless loop or a STOP is a finding, after `limit` seconds at the latest. This call runs
+    the library's code.
+
+    `state` is the number of internal variables of a UMAT, or their names, or names with values at rest. `tangent` is the meaning of a UMAT's
+    DDSDDE: "jaumann_kirchhoff" (Abaqus at finite strain), "jaumann_cauchy" or "strain". `temperature` and `name` are its TEMP and CMNAME.
+    `external` are external state variables of a behaviour of MFront.
+
+    Raises ValueError if the law cannot be called. Linux and macOS only.
+    """
+
+def check_tangent(
+    residual: Callable[[NDArray[np.float64]], Any],
+    jacobian: Any,
+    u: ArrayLike,
+    *,
+    terms: Mapping[str, tuple[Callable[[NDArray[np.float64]], Any], Any]] | None = None,
+    scale: ArrayLike | None = None,
+    seed: int = 1,
+    name: str | None = None,
+) -> Report:
+    """Checks that a tangent is the derivative of a residual at u. There is no tolerance to choose.
+
+    u and the residual are arrays of any shape. `jacobian` is the tangent at u: an array, a SciPy sparse matrix, a LinearOperator, or anything
+    else with `shape` and `@`; or a function `jacobian(u)` that returns one; or a function `jvp(u, w)` that returns the product with w.
+
+    `terms` are parts of the residual with their tangents, each checked by itself: {"inertia": (residual, jacobian), …}. If the tangent of the
+    whole lacks one of them, or has it with a wrong sign or factor, the report says so.
+
+    Up to 30 unknowns each column is measured, otherwise three random directions. Then halving finds a wrong entry.
+
+    `scale` is a change of u over which the residual changes its nature, a number or an array like u: unknowns of different units need an
+    array. The default is the greatest |u|, or 1. Rows of different units should be checked apart.
+
+    Raises what residual and jacobian raise at u, and ValueError for shapes that do not fit.
+    """
+
+def newton_order(norms: ArrayLike, *, round_off: float | None = None) -> NewtonOrder:
+    """The order of convergence from the residual norms of a solution: ‖R‖ at the initial guess and after each iteration.
+
+    Norms up to `round_off` are round-off; by default 1e-14 of the greatest norm.
+    """
+
+def newton_table(
+    solutions: Mapping[str, ArrayLike] | Sequence[ArrayLike],
+    form: Literal["text", "markdown", "latex", "csv"] = "text",
+    *,
+    round_off: float | None = None,
+) -> str:
+    """A table of residual norms with their order of convergence, a row for each solution. LaTeX needs the package booktabs."""
+
+@final
+class LawStep:
+    """The inputs of a law in a step. Tensors are arrays (3, 3), or (2, 2) in two dimensions."""
+
+    @property
+    def F(self) -> NDArray[np.float64]:
+        """Deformation gradient at the end of the step."""
+
+    @property
+    def F_before(self) -> NDArray[np.float64]:
+        """Deformation gradient at the start of the step."""
+
+    @property
+    def strain(self) -> NDArray[np.float64]:
+        """Accumulated strain at the start of the step, turned by `rotation`."""
+
+    @property
+    def strain_increment(self) -> NDArray[np.float64]:
+        """Δε = ln ΔV of F F_before⁻¹ = ΔV ΔR."""
+
+    @property
+    def rotation(self) -> NDArray[np.float64]:
+        """ΔR"""
+
+    @property
+    def stress(self) -> NDArray[np.float64]:
+        """The stress at the start of the step as the law returned it, not turned."""
+
+    @property
+    def state(self) -> NDArray[np.float64]:
+        """Internal variables at the start of the step, (n,)."""
+
+    @property
+    def time(self) -> float:
+        """Time at the start of the step."""
+
+    @property
+    def dt(self) -> float:
+        """The length of the step."""
+
+    @property
+    def number(self) -> int:
+        """The number of the step, from 1."""
+
+@final
+class Report:
+    """The checks of a law or a residual. `str(report)` is a table for a terminal; a notebook shows Markdown."""
+
+    @property
+    def verdict(self) -> Literal["consistent", "inexact", "not checked", "wrong"]:
+        """The worst verdict of the findings. States at kinks do not count beside others."""
+
+    @property
+    def ok(self) -> bool:
+        """Whether the tangent is consistent, or inexact."""
+
+    @property
+    def subject(self) -> str:
+        """The name of the law or residual."""
+
+    @property
+    def convention(self) -> str:
+        """The meaning of the tangent, with the order of its components; empty for residuals."""
+
+    @property
+    def seed(self) -> int: ...
+    @property
+    def findings(self) -> list[Finding]: ...
+    @property
+    def diagnoses(self) -> list[Diagnosis]:
+        """Mistakes that explain a wrong tangent; empty if none of the frequent ones does."""
+
+    @property
+    def notes(self) -> list[str]:
+        """Sentences: the inputs that the law reads, mistakes that these states cannot show."""
+
+    @property
+    def exception(self) -> BaseException | None:
+        """The first exception that a function of yours raised."""
+
+    def assert_consistent(self, *, strict: bool = False) -> None:
+        """Raises an AssertionError with the report, unless the tangent is consistent; with `strict`, also if it is inexact.
+
+        A tangent that is not checked raises too. The cause of the error is `exception`.
+        """
+
+    def exit_code(self, *, strict: bool = False) -> int:
+        """0 consistent or inexact, 1 wrong, 3 not checked; inexact is 1 with `strict`."""
+
+    def to_markdown(self, *, strict: bool = False) -> str: ...
+    def to_json(self, *, strict: bool = False) -> str:
+        """All numbers. `verification/tangent-check/src/report/json.schema.json` describes the format."""
+
+    def to_junit(self, *, strict: bool = False) -> str:
+        """JUnit XML."""
+
+    def to_sarif(self, file: str | None = None, *, strict: bool = False) -> str:
+        """A SARIF 2.1.0 log, whose results point to `file`."""
+
+    def to_github(self, file: str | None = None, *, strict: bool = False) -> str:
+        """Annotations of GitHub Actions, which point to `file`: print them."""
+
+    def _repr_markdown_(self) -> str: ...
+
+@final
+class Finding:
+    """The check of one tangent in one state."""
+
+    @property
+    def name(self) -> str:
+        """The state or term."""
+
+    @property
+    def verdict(self) -> Literal["consistent", "inexact", "not checked", "wrong"]: ...
+    @property
+    def reason(
+        self,
+    ) -> Literal["kink", "nothing exercised", "zero response", "too noisy", "control missed", "call failed"] | None:
+        """Why the tangent was not checked."""
+
+    @property
+    def sentence(self) -> str | None:
+        """`reason` in a sentence, with its numbers or the text of an exception."""
+
+    @property
+    def worst(self) -> Entry | None:
+        """The entry that deviates most."""
+
+    @property
+    def deviation(self) -> float:
+        """The greatest |claimed − measured|, relative to the greatest entry of the measured tangent."""
+
+    @property
+    def error(self) -> float:
+        """The greatest estimated error of the differences, with the same scale."""
+
+    @property
+    def noise(self) -> float:
+        """The noise of the response, relative to its greatest component."""
+
+    @property
+    def control(self) -> float | None:
+        """The smallest planted error that the check saw, relative to the spoiled entry."""
+
+    @property
+    def calls(self) -> int:
+        """Calls of the stress or residual."""
+
+    @property
+    def claimed(self) -> NDArray[np.float64]:
+        """The tangent as claimed; beyond 30 unknowns its products with random directions, a column each."""
+
+    @property
+    def measured(self) -> NDArray[np.float64]:
+        """The tangent as measured. Entries that could not be measured are NaN."""
+
+    @property
+    def errors(self) -> NDArray[np.float64]:
+        """The estimated error of each measured entry."""
+
+@final
+class Entry:
+    """An entry of a tangent."""
+
+    @property
+    def row(self) -> int:
+        """From 0."""
+
+    @property
+    def column(self) -> int:
+        """From 0."""
+
+    @property
+    def claimed(self) -> float: ...
+    @property
+    def measured(self) -> float: ...
+    @property
+    def error(self) -> float:
+        """The estimated error of `measured`."""
+
+@final
+class Diagnosis:
+    """A frequent mistake that explains a wrong tangent."""
+
+    @property
+    def sentence(self) -> str: ...
+    @property
+    def candidates(self) -> list[str]:
+        """All mistakes that explain the tangent equally well in the states tried; one if the diagnosis is unique."""
+
+    @property
+    def states_that_tell(self) -> list[str]:
+        """States that would tell the candidates apart."""
+
+    @property
+    def coefficient(self) -> float | None:
+        """The coefficient of a missing or surplus term."""
+
+@final
+class NewtonOrder:
+    """The order of convergence that residual norms show: `str(order)` is "quadratic (2.0)", for instance."""
+
+    @property
+    def kind(self) -> Literal["quadratic", "superlinear", "linear", "round-off at once", "unknown", "not finite"]: ...
+    @property
+    def order(self) -> float | None: ...
+    @property
+    def orders(self) -> list[float | None]:
+        """The order that each iteration shows, from the second on; None where it shows none."""
+
+    @property
+    def is_quadratic(self) -> bool:
+        """Whether the order is quadratic, or the norms reach round-off at once."""

@@ -3,7 +3,9 @@
 use crate::arrays::frozen;
 use pyo3::exceptions::PyAssertionError;
 use pyo3::prelude::*;
-use tangent_check::finding::{Diagnosis as Explained, Entry as Compared, Finding as Checked, Report as Findings};
+use tangent_check::finding::{
+    Diagnosis as Explained, Entry as Compared, Finding as Checked, Reason, Report as Findings,
+};
 use tangent_check::matrix::Matrix;
 use tangent_check::report::{Format, Options, write};
 
@@ -178,9 +180,22 @@ impl Finding {
         self.0.verdict.to_string()
     }
 
-    /// Why the tangent was not checked.
+    /// Why the tangent was not checked, in a word or two.
     #[getter]
-    fn reason(&self) -> Option<String> {
+    fn reason(&self) -> Option<&'static str> {
+        self.0.reason.as_ref().map(|reason| match reason {
+            Reason::Kink => "kink",
+            Reason::NothingExercised => "nothing exercised",
+            Reason::ZeroResponse => "zero response",
+            Reason::TooNoisy(_) => "too noisy",
+            Reason::ControlMissed(_) => "control missed",
+            Reason::CallFailed(_) => "call failed",
+        })
+    }
+
+    /// Why the tangent was not checked, in a sentence.
+    #[getter]
+    fn sentence(&self) -> Option<String> {
         self.0.reason.as_ref().map(ToString::to_string)
     }
 
