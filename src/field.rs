@@ -149,12 +149,12 @@ impl Field {
     /// assert_eq!(Field::Jacobian.columns("tip", 2), ["tip"]);
     /// ```
     pub fn columns(self, name: &str, dimension: usize) -> Vec<String> {
-        let kind = self.kind();
-        let count = if kind == Kind::Vector { dimension } else { usize::MAX };
-        let column = |component: &&str| match *component {
-            "" => name.to_owned(),
-            component => format!("{name}_{component}"),
-        };
-        kind.components().iter().take(count).map(column).collect()
+        let count = if self.kind() == Kind::Vector { dimension } else { usize::MAX };
+        self.kind().components().iter().take(count).map(|component| column(name, component)).collect()
     }
+}
+
+/// The column that holds a component of `name`.
+pub(crate) fn column(name: &str, component: &str) -> String {
+    if component.is_empty() { name.to_owned() } else { format!("{name}_{component}") }
 }

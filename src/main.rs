@@ -3,7 +3,8 @@
 mod program;
 
 use bfree::causes;
-use bfree::output::plot::{Look, PlotError, View, plot_frames, plot_run};
+use bfree::output::OutputError;
+use bfree::output::plot::{Look, View, plot_frames, plot_run};
 use bfree::scene;
 use clap::{Parser, Subcommand};
 use program::{CheckLaw, Failure, INTERRUPTED, New, Newton, Run, SceneArguments, print, tell};
@@ -99,7 +100,7 @@ fn plot(directory: &Path, movie: Option<&Path>, look: &Look) -> Result<(), Failu
     let pictures = movie.map_or_else(|| plot_run(directory, look), |frames| plot_frames(directory, frames, look));
     let pictures = pictures.map_err(|error| match error {
         // The option --field names a field that the snapshots do not hold.
-        PlotError::Field { .. } => Failure::scene(error),
+        OutputError::NoField { .. } => Failure::scene(error),
         error => Failure::run(error),
     })?;
     print(pictures.iter().map(|picture| picture.display().to_string()).collect::<Vec<_>>().join("\n"))

@@ -25,45 +25,39 @@ pub struct Contact {
     pub pulled_apart: Option<f64>,
 }
 
-/// All contacts of a run.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(transparent)]
-pub(crate) struct Contacts(Vec<Contact>);
-
-impl Contacts {
-    /// All contacts so far.
-    pub fn all(&self) -> &[Contact] {
-        &self.0
-    }
-
-    /// Records a step that ended at `time`; `first` marks the first step of the run. Returns a sentence for each pair of bodies that is now
-    /// pulled apart for the first time.
-    pub fn see(&mut self, time: f64, dt: f64, first: bool, sharing: &[Sharing], names: &[&str]) -> Vec<String> {
-        let named = |sharing: &Sharing| sharing.bodies.map(|body| names[body as usize].to_owned());
-        for contact in self.0.iter_mut().filter(|contact| contact.until.is_none()) {
-            if !sharing.iter().any(|one| named(one) == contact.bodies) {
-                contact.until = Some(time);
-            }
+/// Adds a step that ended at `time` to the contacts of a run; `first` marks the first step of the run. Returns a sentence for each pair of
+/// bodies that is now pulled apart for the first time.
+pub(crate) fn see(
+    contacts: &mut Vec<Contact>,
+    time: f64,
+    dt: f64,
+    first: bool,
+    sharing: &[Sharing],
+    names: &[&str],
+) -> Vec<String> {
+    let named = |sharing: &Sharing| sharing.bodies.map(|body| names[body as usize].to_owned());
+    for contact in contacts.iter_mut().filter(|contact| contact.until.is_none()) {
+        if !sharing.iter().any(|one| named(one) == contact.bodies) {
+            contact.until = Some(time);
         }
-        let mut said = Vec::new();
-        for one in sharing {
-            let (bodies, gap) = (named(one), one.gap);
-            let known = self.0.iter().position(|contact| contact.until.is_none() && contact.bodies == bodies);
-            let at = known.unwrap_or(self.0.len());
-            if known.is_none() {
-                let since = if first { time - dt } else { time };
-                let gap = [gap; 2];
-                self.0.push(Contact { bodies, since, from_start: first, until: None, gap, pulled_apart: None });
-            }
-            let contact = &mut self.0[at];
-            contact.gap[1] = gap;
-            if contact.pulled_apart.is_none() && contact.is_pulled(one) {
-                contact.pulled_apart = Some(time);
-                said.push(contact.pulled_says(one));
-            }
-        }
-        said
     }
+    let mut said = Vec::new();
+    for one in sharing {
+        let (bodies, gap) = (named(one), [one.gap; 2]);
+        let known = contacts.iter().position(|contact| contact.until.is_none() && contact.bodies == bodies);
+        let at = known.unwrap_or(contacts.len());
+        if known.is_none() {
+            let since = if first { time - dt } else { time };
+            contacts.push(Contact { bodies, since, from_start: first, until: None, gap, pulled_apart: None });
+        }
+        let contact = &mut contacts[at];
+        contact.gap[1] = one.gap;
+        if contact.pulled_apart.is_none() && contact.is_pulled(one) {
+            contact.pulled_apart = Some(time);
+            said.push(contact.pulled_says(one));
+        }
+    }
+    said
 }
 
 impl Contact {
@@ -117,26 +111,26 @@ mod tests {
     fn bodies_that_meet_and_leave_are_no_warning_and_bodies_that_are_held_are() {
         let sharing = |gap: f64, tension: Option<f64>| [Sharing { bodies: [0, 1], gap: Some(gap), tension }];
         let names = ["a", "b"];
-        let mut contacts = Contacts::default();
-        assert!(contacts.see(0.1, 0.1, true, &[], &names).is_empty() && contacts.all().is_empty());
+        let mut contacts = Vec::new();
+        assert!(see(&mut contacts, 0.1, 0.1, true, &[], &names).is_empty() && contacts.is_empty());
         for (time, gap, tension) in [(0.2, 1.5, None), (0.3, 0.5, None), (0.4, 1.4, Some(1.0)), (0.5, 1.59, Some(1.0))]
         {
-            assert!(contacts.see(time, 0.1, false, &sharing(gap, tension), &names).is_empty(), "{time}");
+            assert!(see(&mut contacts, time, 0.1, false, &sharing(gap, tension), &names).is_empty(), "{time}");
         }
-        let said = contacts.see(0.6, 0.1, false, &sharing(1.7, None), &names);
+        let said = see(&mut contacts, 0.6, 0.1, false, &sharing(1.7, None), &names);
         assert!(
             matches!(&said[..], [one] if one.contains("since t = 0.2") && one.contains("1.70 spacings")),
             "{said:?}"
         );
-        assert!(contacts.see(0.7, 0.1, false, &sharing(1.9, None), &names).is_empty(), "once");
-        assert!(contacts.see(0.8, 0.1, false, &[], &names).is_empty());
-        let [contact] = contacts.all() else { panic!("one: {contacts:?}") };
+        assert!(see(&mut contacts, 0.7, 0.1, false, &sharing(1.9, None), &names).is_empty(), "once");
+        assert!(see(&mut contacts, 0.8, 0.1, false, &[], &names).is_empty());
+        let [contact] = &contacts[..] else { panic!("one: {contacts:?}") };
         assert_eq!((contact.until, contact.pulled_apart, contact.gap), (Some(0.8), Some(0.6), [Some(1.5), Some(1.9)]));
         // For bodies in contact since the start, a tension suffices.
-        let mut bonded = Contacts::default();
-        assert!(bonded.see(0.1, 0.1, true, &sharing(0.0, None), &names).is_empty());
-        let said = bonded.see(0.2, 0.1, false, &sharing(0.01, Some(2.0)), &names);
+        let mut bonded = Vec::new();
+        assert!(see(&mut bonded, 0.1, 0.1, true, &sharing(0.0, None), &names).is_empty());
+        let said = see(&mut bonded, 0.2, 0.1, false, &sharing(0.01, Some(2.0)), &names);
         assert!(matches!(&said[..], [one] if one.contains("since the start") && one.contains("2.000e0")), "{said:?}");
-        assert_eq!(bonded.all()[0].since, 0.0);
+        assert_eq!(bonded[0].since, 0.0);
     }
 }

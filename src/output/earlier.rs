@@ -4,14 +4,16 @@ use super::OutputError;
 use super::files::TEMPORARY;
 use super::mark::Mark;
 use super::plot::is_picture;
-use super::snapshots::{SERIES, SnapshotMark};
+use super::pvd::SERIES;
+use super::snapshots::SnapshotMark;
 use serde_json::Value;
-use std::fs::File;
-use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 /// The table with a row for every step.
 const HISTORY: &str = "history.csv";
+
+/// The start of that table.
+const START: &[u8] = b"step,time,";
 
 /// The files of a run, beside its snapshots and its pictures.
 const FILES: [&str; 6] = [HISTORY, "reactions.csv", "probes.csv", "newton.jsonl", "report.json", SERIES];
@@ -38,16 +40,14 @@ fn is_output(name: &str) -> bool {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn foreign(directory: &Path) -> Option<PathBuf> {
-    let mut start = Vec::new();
-    let begin = File::open(directory.join(HISTORY)).and_then(|file| file.take(10).read_to_end(&mut start));
+    let history = std::fs::read(directory.join(HISTORY)).ok();
     // The history of a run that died at once has no line.
-    if report(directory).is_some() || (begin.is_ok() && b"step,time,".starts_with(&start)) {
+    let is_history = |text: &[u8]| text.starts_with(START) || START.starts_with(text);
+    if report(directory).is_some() || history.is_some_and(|text| is_history(&text)) {
         return None;
     }
-    let mut names: Vec<_> =
-        std::fs::read_dir(directory).ok()?.filter_map(|entry| Some(entry.ok()?.file_name())).collect();
-    names.sort();
-    names.iter().find(|name| name.to_str().is_some_and(is_output)).map(|name| directory.join(name))
+    let names = std::fs::read_dir(directory).ok()?.filter_map(|entry| Some(entry.ok()?.file_name()));
+    names.filter(|name| name.to_str().is_some_and(is_output)).min().map(|name| directory.join(name))
 }
 
 /// The report in `directory`, if this program wrote it.
@@ -92,15 +92,9 @@ pub fn held(directory: &Path) -> Option<Held> {
 
 /// Step and time in the last whole row of a history.
 fn last_row(history: &Path) -> Option<(u64, f64)> {
-    // Bytes that are read; a row is much shorter.
-    const TAIL: u64 = 1 << 16;
-    let mut file = File::open(history).ok()?;
-    let length = file.metadata().ok()?.len();
-    file.seek(SeekFrom::Start(length.saturating_sub(TAIL))).ok()?;
-    let mut tail = Vec::new();
-    file.take(TAIL).read_to_end(&mut tail).ok()?;
-    let tail = String::from_utf8_lossy(&tail);
-    let (whole, _) = tail.rsplit_once('\n')?;
+    let bytes = std::fs::read(history).ok()?;
+    let text = String::from_utf8_lossy(&bytes);
+    let (whole, _) = text.rsplit_once('\n')?;
     let mut cells = whole.lines().next_back()?.split(',');
     Some((cells.next()?.parse().ok()?, cells.next()?.parse().ok()?))
 }
@@ -109,10 +103,7 @@ fn last_row(history: &Path) -> Option<(u64, f64)> {
 /// new file.
 pub(super) fn remove_later_files(directory: &Path, mark: Option<&Mark>) -> Result<(), OutputError> {
     let snapshots = mark.and_then(|mark| mark.snapshots).unwrap_or_default();
-    let continued = |name: &str| match name {
-        SERIES => mark.is_some(),
-        _ => mark.is_some_and(|mark| mark.files.contains_key(name)),
-    };
+    let continued = |name: &str| mark.is_some_and(|mark| name == SERIES || mark.files.contains_key(name));
     let entries = std::fs::read_dir(directory).map_err(OutputError::io("read", directory))?;
     for entry in entries {
         let entry = entry.map_err(OutputError::io("read", directory))?;

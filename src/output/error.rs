@@ -1,10 +1,10 @@
-//! Errors while results are written.
+//! Errors while results are written, read or drawn.
 
 use crate::field::Field;
 use crate::material::NonPositiveJacobian;
 use std::path::{Path, PathBuf};
 
-/// Results could not be written.
+/// Results could not be written, read or drawn.
 #[derive(Debug, thiserror::Error)]
 pub enum OutputError {
     /// The operating system refused.
@@ -17,13 +17,13 @@ pub enum OutputError {
         /// Reason given by the operating system.
         source: std::io::Error,
     },
-    /// The report could not be put into JSON.
-    #[error("cannot write {} as JSON: {source}", path.display())]
-    Json {
+    /// A file of a run has other content than a run writes.
+    #[error("{} {what}", path.display())]
+    Content {
         /// The file.
         path: PathBuf,
-        /// The reason.
-        source: serde_json::Error,
+        /// The wrong part, a sentence without its subject.
+        what: String,
     },
     /// A particle has no stress.
     #[error("particle {particle} has no stress: {source}")]
@@ -75,24 +75,6 @@ pub enum OutputError {
         /// The name.
         column: String,
     },
-    /// A table to be continued has other columns.
-    #[error("{} has other columns than this run, so it cannot be continued", path.display())]
-    OtherColumns {
-        /// The table.
-        path: PathBuf,
-    },
-    /// A file to be continued has become shorter.
-    #[error("{} ends before the place where it was to be continued", path.display())]
-    Shorter {
-        /// The file.
-        path: PathBuf,
-    },
-    /// A file to be continued has other content.
-    #[error("{} is not what it was when the checkpoint was written", path.display())]
-    Changed {
-        /// The file.
-        path: PathBuf,
-    },
     /// The reference belongs to another set of particles.
     #[error("the reference state has {reference} particles, the simulation {particles}")]
     Reference {
@@ -101,11 +83,35 @@ pub enum OutputError {
         /// Particles of the simulation.
         particles: usize,
     },
+    /// There are no snapshots for a movie.
+    #[error("{} holds no snapshots: give the scene output.every", .0.display())]
+    NoSnapshots(PathBuf),
+    /// The snapshots do not hold the field asked for.
+    #[error("the snapshots hold no field {field:?}; they hold {there}; the key output.fields says what a run writes")]
+    NoField {
+        /// The field.
+        field: String,
+        /// The fields of the snapshots.
+        there: String,
+    },
+    /// The renderer refused.
+    #[error("cannot draw {name}: {reason}")]
+    Draw {
+        /// The picture.
+        name: &'static str,
+        /// The reason given by the renderer.
+        reason: String,
+    },
 }
 
 impl OutputError {
     /// Converts an error of the operating system, for `map_err`.
     pub(crate) fn io(action: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> Self {
         move |source| Self::Io { action, path: path.to_owned(), source }
+    }
+
+    /// The error of a file with wrong content; `what` continues the sentence that begins with the path.
+    pub(crate) fn content(path: &Path, what: impl Into<String>) -> Self {
+        Self::Content { path: path.to_owned(), what: what.into() }
     }
 }

@@ -58,40 +58,29 @@ impl Field {
         let id = particles.id[place] as usize;
         let at = || particles.state(place, 0.0);
         let body = &simulation.bodies[particles.body[place] as usize];
-        let law = || &body.law;
+        let law = &body.law;
         let averaged = || body.averaged(particles.dilatation(place), at().j);
         let stress = || {
-            cauchy_stress(law(), at())
+            cauchy_stress(law, at())
                 .map(|stress| stress + Tensor::<f64, 3>::identity() * averaged()[1])
                 .map_err(|source| OutputError::Inadmissible { particle: id, source })
         };
-        let recalled = |name| internal_variable(law(), &at(), name).unwrap_or(0.0);
+        let symmetric = |tensor: Tensor<f64, 3>| SYMMETRIC.map(|component| tensor[component]);
+        let rate = |rates: &[Vector<f64, D>]| rates.get(place).map(padded).ok_or(OutputError::Inertia(self));
+        let recalled = |name| internal_variable(law, &at(), name).unwrap_or(0.0);
         match self {
             Self::Position => out.extend(padded(&particles.position[place])),
-            Self::Displacement => {
-                out.extend(padded(&(particles.position[place] - reference.position[id])));
-            }
-            Self::Velocity => out.extend(padded(particles.velocity.get(place).ok_or(OutputError::Inertia(self))?)),
-            Self::Acceleration => {
-                out.extend(padded(particles.acceleration.get(place).ok_or(OutputError::Inertia(self))?));
-            }
-            Self::DeformationGradient => {
-                let f = identity::<f64, 3>() + embed(&at().h);
-                out.extend(f.transpose().iter());
-            }
+            Self::Displacement => out.extend(padded(&(particles.position[place] - reference.position[id]))),
+            Self::Velocity => out.extend(rate(&particles.velocity)?),
+            Self::Acceleration => out.extend(rate(&particles.acceleration)?),
+            Self::DeformationGradient => out.extend(&(identity::<f64, 3>() + embed(&at().h)).transpose()),
             Self::Jacobian => out.push(at().jacobian),
-            Self::Strain => {
-                let strain = embed(&at().green_lagrange());
-                out.extend(SYMMETRIC.map(|at| strain[at]));
-            }
-            Self::Stress => {
-                let stress = stress()?;
-                out.extend(SYMMETRIC.map(|at| stress[at]));
-            }
+            Self::Strain => out.extend(symmetric(embed(&at().green_lagrange()))),
+            Self::Stress => out.extend(symmetric(stress()?)),
             Self::PrincipalStress => out.extend(principal_values(&stress()?)),
             Self::Pressure => out.push(-stress()?.trace() / 3.0),
             Self::VonMises => out.push(von_mises(&stress()?)),
-            Self::EnergyDensity => out.push(law().energy(&at()) + averaged()[0]),
+            Self::EnergyDensity => out.push(law.energy(&at()) + averaged()[0]),
             Self::PlasticStrain => out.push(recalled(PLASTIC_STRAIN)),
             Self::DissipatedDensity => out.push(recalled(DISSIPATED)),
             Self::Mass => out.push(particles.mass[place]),

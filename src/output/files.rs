@@ -2,9 +2,10 @@
 
 use super::OutputError;
 use crc32fast::Hasher;
+use flate2::CrcReader;
 use serde::{Deserialize, Serialize};
 use std::fs::{File, OpenOptions};
-use std::io::{BufRead, BufReader, BufWriter, Read, Seek, SeekFrom, Write};
+use std::io::{BufReader, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use tempfile::NamedTempFile;
@@ -40,10 +41,18 @@ pub(crate) fn write_atomically(
     write().map_err(OutputError::io("write", path))
 }
 
+/// The content of a file; `None` if there is no such file.
+pub(crate) fn read_if_there(path: &Path) -> Result<Option<Vec<u8>>, OutputError> {
+    match std::fs::read(path) {
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
+        content => content.map(Some).map_err(OutputError::io("read", path)),
+    }
+}
+
 /// Length and checksum of a growing file at one moment.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Written {
+pub(crate) struct Written {
     bytes: u64,
     crc32: u32,
 }
@@ -51,25 +60,16 @@ pub struct Written {
 impl Written {
     /// Checks that the file at `path` begins with this content.
     pub(crate) fn check(&self, path: &Path) -> Result<(), OutputError> {
-        let mut sum = Hasher::new();
-        let read = || -> std::io::Result<u64> {
-            let (mut file, mut bytes) = (BufReader::new(File::open(path)?).take(self.bytes), 0);
-            loop {
-                let part = file.fill_buf()?;
-                let length = part.len();
-                if length == 0 {
-                    return Ok(bytes);
-                }
-                sum.update(part);
-                file.consume(length);
-                bytes += length as u64;
-            }
-        };
-        let bytes = { read }().map_err(OutputError::io("continue", path))?;
+        let file = File::open(path).map_err(OutputError::io("continue", path))?;
+        let mut content = CrcReader::new(BufReader::new(file.take(self.bytes)));
+        let bytes = std::io::copy(&mut content, &mut std::io::sink()).map_err(OutputError::io("continue", path))?;
         if bytes < self.bytes {
-            return Err(OutputError::Shorter { path: path.to_owned() });
+            return Err(OutputError::content(path, "ends before the place where it was to be continued"));
         }
-        if sum.finalize() == self.crc32 { Ok(()) } else { Err(OutputError::Changed { path: path.to_owned() }) }
+        if content.crc().sum() != self.crc32 {
+            return Err(OutputError::content(path, "is not what it was when the checkpoint was written"));
+        }
+        Ok(())
     }
 }
 
@@ -87,7 +87,7 @@ pub(crate) struct Stream {
 impl Stream {
     /// Creates or empties the file. To continue a file, keeps its first `kept` bytes, which must be there.
     pub(crate) fn open(path: PathBuf, kept: Option<Written>) -> Result<Self, OutputError> {
-        let Written { bytes: length, crc32 } = kept.unwrap_or(Written { bytes: 0, crc32: 0 });
+        let Written { bytes: length, crc32 } = kept.unwrap_or_default();
         let sum = Hasher::new_with_initial_len(crc32, length);
         let open = || -> std::io::Result<File> {
             let mut file = OpenOptions::new().write(true).create(kept.is_none()).truncate(false).open(&path)?;

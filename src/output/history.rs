@@ -1,18 +1,18 @@
-//! `history.csv`: energies, momentum and iterations of every step.
+//! The rows of every step in `history.csv`, with energies, momentum and iterations, and in `reactions.csv`.
 
-use super::csv::{Row, Table};
-use super::files::Written;
-use super::{OutputError, Reference};
+use super::Reference;
+use super::csv::{Row, cell};
+use super::fields::padded;
 use crate::approximation::ShapeFunction;
 use crate::material::{DISSIPATED, Law, PLASTIC_STRAIN};
+use crate::mechanics::loads::{Loads, Reaction};
 use crate::simulation::Simulation;
-use std::path::PathBuf;
 
 /// Axis names at the ends of column names.
 pub(crate) const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// The energies of a simulation, in the user's unit (per unit of the missing dimensions).
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Energies {
     /// Σ ½ m v·v
     pub kinetic: f64,
@@ -67,7 +67,7 @@ impl Energies {
 
 /// Length of a step, its iterations, and its plastic flow.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Cost {
+pub(crate) struct Cost {
     /// Δt; 0 for the initial state.
     pub dt: f64,
     /// Newton iterations.
@@ -78,93 +78,42 @@ pub struct Cost {
     pub yielding: f64,
 }
 
-/// Writes `history.csv`.
-///
-/// ```
-/// use bfree::output::{Reference, history::{Cost, History}};
-///
-/// let (folder, scene) = (tempfile::tempdir()?, bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?);
-/// let simulation = scene.build::<2>("scenes".as_ref())?;
-/// let path = folder.path().join("history.csv");
-/// let mut history = History::open(path.clone(), &simulation, None)?;
-/// let energies = history.write(&simulation, &Reference::of(&simulation), Cost::default())?;
-/// history.flush()?;
-/// // The file gives back the same bits.
-/// let text = std::fs::read_to_string(path)?;
-/// let (names, row) = text.trim_end().split_once('\n').ok_or("two lines")?;
-/// let column = names.split(',').position(|name| name == "kinetic").ok_or("a column")?;
-/// assert_eq!(row.split(',').nth(column).ok_or("a value")?.parse::<f64>()?, energies.kinetic);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-#[derive(Debug)]
-pub struct History {
-    pub(crate) table: Table,
-    /// Whether there is inertia. In load steps, loads act at once, and an energy balance says nothing of their work.
-    has_inertia: bool,
-    dissipates: bool,
-    follows_path: bool,
-    yields: bool,
+/// The row of the present state in `history.csv`. Columns without meaning in a run are left out. In load steps, loads act at once, and an
+/// energy balance says nothing of their work.
+pub(crate) fn row<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, energies: &Energies, cost: Cost) -> Row {
+    let Energies { kinetic, strain, external, dissipated, total, balance, .. } = *energies;
+    let scheme = &simulation.settings.scheme;
+    let dissipates = simulation.loads.damping.is_some() || simulation.has_internal_variable(DISSIPATED);
+    let momentum = padded(&simulation.particles.momentum());
+    let columns = [
+        (true, "step", cell(simulation.clock.steps())),
+        (true, "time", cell(simulation.clock.time())),
+        (scheme.follows_path(), "load", cell(simulation.path.load)),
+        (true, "dt", cell(cost.dt)),
+        (true, "kinetic", cell(kinetic)),
+        (true, "strain", cell(strain)),
+        (true, "external", cell(external)),
+        (dissipates, "dissipated", cell(dissipated)),
+        (true, "total", cell(total)),
+        (scheme.has_inertia(), "balance", cell(balance)),
+        (true, "momentum_x", cell(momentum[0])),
+        (D > 1, "momentum_y", cell(momentum[1])),
+        (D > 2, "momentum_z", cell(momentum[2])),
+        (true, "newton", cell(cost.newton)),
+        (true, "krylov", cell(cost.krylov)),
+        (simulation.has_internal_variable(PLASTIC_STRAIN), "yielding", cell(cost.yielding)),
+    ];
+    columns.into_iter().filter(|(is_there, ..)| *is_there).map(|(_, name, cell)| (name.to_owned(), cell)).collect()
 }
 
-impl History {
-    /// Creates the file with the columns of the simulation, or continues a file after its first `kept` bytes.
-    ///
-    /// # Errors
-    /// The operating system refuses, or the file to be continued has other columns.
-    pub fn open<const D: usize, L: Law, A>(
-        path: PathBuf,
-        simulation: &Simulation<D, L, A>,
-        kept: Option<Written>,
-    ) -> Result<Self, OutputError> {
-        let has_inertia = simulation.settings.scheme.has_inertia();
-        let dissipates = simulation.loads.damping.is_some() || simulation.has_internal_variable(DISSIPATED);
-        let (follows_path, yields) =
-            (simulation.settings.scheme.follows_path(), simulation.has_internal_variable(PLASTIC_STRAIN));
-        let mut columns: Vec<String> = ["step", "time"].map(str::to_owned).into();
-        columns.extend(follows_path.then(|| "load".into()));
-        columns.extend(["dt", "kinetic", "strain", "external"].map(str::to_owned));
-        columns.extend(dissipates.then(|| "dissipated".into()));
-        columns.push("total".into());
-        columns.extend(has_inertia.then(|| "balance".into()));
-        columns.extend(AXES.iter().take(D).map(|axis| format!("momentum_{axis}")));
-        columns.extend(["newton", "krylov"].map(str::to_owned));
-        columns.extend(yields.then(|| "yielding".into()));
-        Ok(Self { table: Table::open(path, &columns, kept)?, has_inertia, dissipates, follows_path, yields })
+/// The row of a step that ended at `time` in `reactions.csv`. Every prescribed condition has one column per axis, such as `name_x`. A rotation also has the
+/// column `name_torque`.
+pub(crate) fn reactions<const D: usize>(time: f64, loads: &Loads<D>, reactions: &[Reaction<D>]) -> Row {
+    let mut row = vec![("time".to_owned(), cell(time))];
+    for (condition, reaction) in loads.prescribed.iter().zip(reactions) {
+        let name = &condition.name;
+        row.extend(AXES.iter().zip(&reaction.force).map(|(axis, force)| (format!("{name}_{axis}"), cell(force))));
+        row.extend(condition.rotation().map(|_| (format!("{name}_torque"), cell(reaction.torque))));
     }
-
-    /// Appends the present state and returns its energies.
-    ///
-    /// # Errors
-    /// The operating system refuses.
-    pub fn write<const D: usize, L: Law, A: ShapeFunction>(
-        &mut self,
-        simulation: &Simulation<D, L, A>,
-        reference: &Reference<D>,
-        cost: Cost,
-    ) -> Result<Energies, OutputError> {
-        let energies = Energies::of(simulation, reference);
-        let mut row = Row::default();
-        row.push(simulation.clock.steps());
-        row.push(simulation.clock.time());
-        row.extend(self.follows_path.then_some(simulation.path.load));
-        row.push(cost.dt);
-        row.extend([energies.kinetic, energies.strain, energies.external]);
-        row.extend(self.dissipates.then_some(energies.dissipated));
-        row.push(energies.total);
-        row.extend(self.has_inertia.then_some(energies.balance));
-        row.extend(simulation.particles.momentum().iter().copied());
-        row.push(cost.newton);
-        row.push(cost.krylov);
-        row.extend(self.yields.then_some(cost.yielding));
-        self.table.row(&row)?;
-        Ok(energies)
-    }
-
-    /// Hands buffered rows to the operating system.
-    ///
-    /// # Errors
-    /// The operating system refuses.
-    pub fn flush(&mut self) -> Result<(), OutputError> {
-        self.table.0.flush()
-    }
+    row
 }

@@ -4,8 +4,7 @@ use super::history::Energies;
 use serde::{Deserialize, Serialize};
 
 /// The event of a step that may lose energy. Of several events, the first in this list counts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Copy, Debug)]
 pub(crate) enum Cause {
     /// A body feels a wall that it has come to.
     Wall,

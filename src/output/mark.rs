@@ -41,7 +41,7 @@ use std::path::{Path, PathBuf};
 /// assert!(mark.check(folder.path()).unwrap_err().to_string().contains("not what it was"));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Mark {
     /// Content of every growing file at the mark.

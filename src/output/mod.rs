@@ -28,7 +28,6 @@ pub mod plot;
 pub mod probes;
 mod progress;
 mod pvd;
-mod reactions;
 mod recorder;
 mod reference;
 pub mod report;

@@ -2,6 +2,7 @@
 
 use super::Reference;
 use crate::simulation::Simulation;
+use crate::tensor::{Tensor, Vector};
 use serde::{Deserialize, Serialize};
 
 /// Smallest cosine of the angle between two successive steps without a sharp bend.
@@ -17,33 +18,33 @@ const RETURN_DISTANCE: f64 = 0.2;
 /// A point of the path: the load, and moments of the displacement that distinguish states.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Point {
+pub(crate) struct Point {
     load: f64,
     /// Σ V₀ u and Σ V₀ u ⊗ (X − X̄)/L, in one list (length times volume).
     moments: Vec<f64>,
 }
 
 impl Point {
-    fn of<const D: usize, L, A>(simulation: &Simulation<D, L, A>, reference: &Reference<D>) -> Self {
+    pub(crate) fn of<const D: usize, L, A>(simulation: &Simulation<D, L, A>, reference: &Reference<D>) -> Self {
         let particles = &simulation.particles;
         let first = |p: usize| &reference.position[particles.id[p] as usize];
-        let all = || 0..particles.len();
         let volume: f64 = particles.volume.iter().sum();
-        let mut middle = vec![0.0; D];
-        all().for_each(|p| (0..D).for_each(|k| middle[k] += particles.volume[p] * first(p)[k] / volume));
-        let mut moments = vec![0.0; D * (D + 1)];
-        let mut length: f64 = 0.0;
-        for p in all() {
-            let (u, arm) = (particles.position[p] - first(p), |k: usize| first(p)[k] - middle[k]);
-            for i in 0..D {
-                let of = particles.volume[p] * u[i];
-                moments[i] += of;
-                (0..D).for_each(|k| moments[D * (k + 1) + i] += of * arm(k));
-                length = length.max(arm(i).abs());
-            }
+        let mut middle = Vector::<f64, D>::zeros();
+        for (p, part) in particles.volume.iter().enumerate() {
+            middle += *part * first(p) / volume;
         }
-        moments.iter_mut().skip(D).for_each(|moment| *moment /= length.max(f64::MIN_POSITIVE));
-        Self { load: simulation.path.load, moments }
+        let mut displacement = Vector::<f64, D>::zeros();
+        let mut gradient = Tensor::<f64, D>::zeros();
+        let mut length: f64 = 0.0;
+        for (p, part) in particles.volume.iter().enumerate() {
+            let weighted = (particles.position[p] - first(p)) * *part;
+            let arm = first(p) - middle;
+            displacement += weighted;
+            gradient += weighted * arm.transpose();
+            length = length.max(arm.amax());
+        }
+        gradient /= length.max(f64::MIN_POSITIVE);
+        Self { load: simulation.path.load, moments: displacement.iter().chain(&gradient).copied().collect() }
     }
 
     fn distance(&self, other: &[f64]) -> f64 {
@@ -72,17 +73,8 @@ pub(crate) enum Event {
 }
 
 impl Followed {
-    /// Adds a step. `straight` is the cosine of the angle between the displacements of this step and the previous step.
-    pub fn see<const D: usize, L, A>(
-        &mut self,
-        simulation: &Simulation<D, L, A>,
-        reference: &Reference<D>,
-        straight: Option<f64>,
-    ) -> Vec<Event> {
-        self.add(Point::of(simulation, reference), straight)
-    }
-
-    fn add(&mut self, point: Point, straight: Option<f64>) -> Vec<Event> {
+    /// Adds a step to `point`. `straight` is the cosine of the angle between the displacements of this step and the previous step.
+    pub(crate) fn add(&mut self, point: Point, straight: Option<f64>) -> Vec<Event> {
         let mut events = Vec::new();
         if let Some(cosine) = straight.filter(|&cosine| cosine < SHARP_BEND_COSINE) {
             events.push(Event::Bent(cosine.clamp(-1.0, 1.0).acos().to_degrees()));

@@ -1,14 +1,12 @@
 //! `probes.csv`: fields at chosen particles or points against time.
 
-use super::csv::{Row, Table};
-use super::files::Written;
+use super::csv::{Row, cell};
 use super::{OutputError, Reference};
 use crate::field::Field;
 use crate::material::Law;
 use crate::particles::Particles;
 use crate::simulation::Simulation;
 use crate::tensor::Vector;
-use std::path::PathBuf;
 
 /// The particle or point that a probe reads.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,18 +47,17 @@ pub struct Probe<const D: usize> {
 impl<const D: usize> Probe<D> {
     /// Id of the particle that is read now; `None` if no particle is near enough.
     fn particle(&self, particles: &Particles<D>) -> Result<Option<usize>, OutputError> {
-        let name = || self.name.clone();
+        let name = self.name.clone();
         match self.place {
-            Place::Particle(particle) | Place::Carried { particle, .. } if particle < particles.len() => {
-                Ok(Some(particle))
+            Place::Particle(particle) | Place::Carried { particle, .. } if particle >= particles.len() => {
+                Err(OutputError::ProbeParticle { name, particle, particles: particles.len() })
             }
-            Place::Particle(particle) | Place::Carried { particle, .. } => {
-                Err(OutputError::ProbeParticle { name: name(), particle, particles: particles.len() })
+            Place::Particle(particle) | Place::Carried { particle, .. } => Ok(Some(particle)),
+            Place::Nearest { point, body, within } => {
+                let none = || OutputError::ProbePoint { name, point: point.iter().copied().collect() };
+                let (particle, distance) = nearest(particles, &point, body).ok_or_else(none)?;
+                Ok((distance <= within).then_some(particle))
             }
-            Place::Nearest { point, body, within } => match nearest(particles, &point, body) {
-                Some((particle, distance)) => Ok((distance <= within).then_some(particle)),
-                None => Err(OutputError::ProbePoint { name: name(), point: point.iter().copied().collect() }),
-            },
         }
     }
 
@@ -106,44 +103,23 @@ pub fn nearest<const D: usize>(
         .map(|(id, square)| (id, square.sqrt()))
 }
 
-/// Writes `probes.csv`.
-#[derive(Debug)]
-pub(crate) struct Probes<const D: usize> {
-    probes: Vec<Probe<D>>,
-    pub(crate) table: Table,
-}
-
-impl<const D: usize> Probes<D> {
-    /// Creates the file with its header, or continues a file after its first `kept` bytes.
-    pub(crate) fn open(path: PathBuf, probes: Vec<Probe<D>>, kept: Option<Written>) -> Result<Self, OutputError> {
-        let mut columns = vec!["time".to_owned()];
-        for probe in &probes {
-            columns.extend(probe.field.columns(&probe.name, D));
-        }
-        Ok(Self { probes, table: Table::open(path, &columns, kept)? })
-    }
-
-    /// Appends the present values.
-    pub(crate) fn write<L: Law, A>(
-        &mut self,
-        simulation: &Simulation<D, L, A>,
-        reference: &Reference<D>,
-    ) -> Result<(), OutputError> {
-        reference.check(simulation)?;
-        let mut row = Row::default();
-        row.push(simulation.clock.time());
+/// The present row of `probes.csv`.
+pub(crate) fn row<const D: usize, L: Law, A>(
+    probes: &[Probe<D>],
+    simulation: &Simulation<D, L, A>,
+    reference: &Reference<D>,
+) -> Result<Row, OutputError> {
+    reference.check(simulation)?;
+    let mut row = vec![("time".to_owned(), cell(simulation.clock.time()))];
+    for probe in probes {
         let mut values = Vec::new();
-        for probe in &self.probes {
-            values.clear();
-            let columns = probe.field.columns(&probe.name, D).len();
-            match probe.particle(&simulation.particles)? {
-                Some(particle) => probe.field.append(simulation, reference, particle, &mut values)?,
-                None => values.resize(columns, f64::NAN),
-            }
-            let beside = probe.beside(&simulation.particles);
-            beside.iter().flatten().zip(&mut values).for_each(|(add, value)| *value += add);
-            row.extend(values.iter().copied().take(columns));
+        match probe.particle(&simulation.particles)? {
+            Some(particle) => probe.field.append(simulation, reference, particle, &mut values)?,
+            None => values.resize(probe.field.kind().components().len(), f64::NAN),
         }
-        self.table.row(&row)
+        let beside = probe.beside(&simulation.particles);
+        beside.iter().flatten().zip(&mut values).for_each(|(add, value)| *value += add);
+        row.extend(probe.field.columns(&probe.name, D).into_iter().zip(values.into_iter().map(cell)));
     }
+    Ok(row)
 }

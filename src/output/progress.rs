@@ -1,15 +1,12 @@
 //! Progress of a run on standard error: a bar on a terminal, a line now and then elsewhere, or lines of JSON for a program.
 
+use super::history::Cost;
 use super::report::Number;
 use super::warnings::Warning;
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde_json::json;
-use std::collections::VecDeque;
-use std::io::{IsTerminal, Write};
+use std::io::Write;
 use std::time::{Duration, Instant};
-
-/// Seconds over which the pace is measured.
-const WINDOW: f64 = 30.0;
 
 /// Time between two lines of progress where standard error is not a terminal.
 const LINE_INTERVAL: Duration = Duration::from_secs(10);
@@ -18,46 +15,7 @@ const LINE_INTERVAL: Duration = Duration::from_secs(10);
 const JSON_INTERVAL: Duration = Duration::from_millis(100);
 
 /// Resolution of the bar.
-const BAR_LENGTH: f64 = 1000.0;
-
-/// Predicts the time left from the simulated time per wall-clock second of the recent past. Impacts and halved steps slow a run down. An
-/// average since the start would hide the slower pace.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Pace {
-    /// (wall-clock seconds, simulated time), oldest first.
-    marks: VecDeque<(f64, f64)>,
-}
-
-impl Pace {
-    /// Records that simulated `time` is reached at wall-clock second `wall`.
-    pub fn mark(&mut self, wall: f64, time: f64) {
-        self.marks.push_back((wall, time));
-        // The marks must cover the window: a mark is removed when the next mark is old enough to be the first.
-        while self.marks.get(1).is_some_and(|&(second, _)| second <= wall - WINDOW) {
-            self.marks.pop_front();
-        }
-    }
-
-    /// Wall-clock seconds until `end`; `None` before any progress is measured.
-    pub fn left(&self, end: f64) -> Option<f64> {
-        let (&(wall_0, time_0), &(wall_1, time_1)) = (self.marks.front()?, self.marks.back()?);
-        let left = (end - time_1) * ((wall_1 - wall_0) / (time_1 - time_0));
-        left.is_finite().then_some(left.max(0.0))
-    }
-}
-
-/// Numbers shown besides the time.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Shown {
-    /// Steps taken.
-    pub step: u64,
-    /// Newton iterations of the last step.
-    pub newton: usize,
-    /// Krylov iterations of the last step.
-    pub krylov: usize,
-    /// Energy balance so far, gained (> 0) or lost; `None` without inertia.
-    pub balance: Option<f64>,
-}
+const BAR_LENGTH: f64 = 1e9;
 
 /// The reader of the progress.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -71,26 +29,16 @@ pub enum Audience {
     Program,
 }
 
-/// Form of the progress.
-#[derive(Debug)]
-enum Display {
-    Bar(ProgressBar),
-    Lines {
-        last: Instant,
-    },
-    Json {
-        last: Option<Instant>,
-        /// A line held back because it came too soon.
-        held: Option<String>,
-    },
-    Silent,
-}
-
 /// Shows the progress of a run.
 #[derive(Debug)]
 pub(crate) struct Progress {
-    display: Display,
-    pace: Pace,
+    audience: Audience,
+    /// The bar, hidden unless a person sees a terminal. It also predicts the time left, from the pace of the recent past.
+    bar: ProgressBar,
+    /// The last line for a log or a program.
+    last: Option<Instant>,
+    /// A line for a program that came too soon after the last one.
+    held: Option<String>,
     since: Instant,
     start: f64,
     end: f64,
@@ -104,119 +52,70 @@ fn line(text: &str) {
 impl Progress {
     /// Starts now, at simulated time `start`, towards `end`.
     pub fn new(start: f64, end: f64, audience: Audience) -> Self {
-        let now = Instant::now();
-        let display = match audience {
-            Audience::Nobody => Display::Silent,
-            Audience::Program => Display::Json { last: None, held: None },
-            Audience::Person if std::io::stderr().is_terminal() => {
-                let bar = ProgressBar::new(BAR_LENGTH as u64);
-                // If indicatif refuses the constant template, its own style is shown.
-                if let Ok(style) = ProgressStyle::with_template("{bar:30} {percent:>3}%  {elapsed_precise}  {msg}") {
-                    bar.set_style(style);
-                }
-                Display::Bar(bar)
-            }
-            Audience::Person => Display::Lines { last: now },
-        };
-        let mut pace = Pace::default();
-        pace.mark(0.0, start);
-        Self { display, pace, since: now, start, end }
+        let since = Instant::now();
+        let bar = ProgressBar::new(BAR_LENGTH as u64);
+        if audience != Audience::Person {
+            bar.set_draw_target(ProgressDrawTarget::hidden());
+        }
+        // If indicatif refuses the constant template, its own style is shown.
+        if let Ok(style) = ProgressStyle::with_template("{bar:30} {percent:>3}%  {elapsed_precise}  {msg}") {
+            bar.set_style(style);
+        }
+        // A program is told of the first step, a log only after a while.
+        let last = (audience == Audience::Person).then_some(since);
+        Self { audience, bar, last, held: None, since, start, end }
     }
 
-    /// Shows that `time` is reached.
-    pub fn show(&mut self, time: f64, shown: Shown) {
-        if matches!(self.display, Display::Silent) {
-            return;
-        }
-        let Shown { step, newton, krylov, balance } = shown;
-        let elapsed = self.since.elapsed().as_secs_f64();
-        self.pace.mark(elapsed, time);
-        let (left, end) = (self.pace.left(self.end), self.end);
+    /// Shows that `time` is reached, with the energy `balance` so far, gained (> 0) or lost; `None` without inertia.
+    pub fn show(&mut self, time: f64, step: u64, cost: &Cost, balance: Option<f64>) {
+        let (Cost { newton, krylov, .. }, end) = (*cost, self.end);
+        self.bar.set_position((BAR_LENGTH * (time - self.start) / (end - self.start)) as u64);
+        let left = (self.bar.per_sec() > 0.0).then(|| self.bar.eta());
         let text = || {
-            let left = left.map_or_else(|| "unknown".to_owned(), readable);
+            let left = left.map_or_else(|| "unknown".to_owned(), |left| HumanDuration(left).to_string());
             let balance = balance.map_or_else(String::new, |balance| format!("balance {balance:+.1e}, "));
             format!("t = {time:.6} of {end:.6}, step {step}, Newton {newton}, Krylov {krylov}, {balance}{left} left")
         };
-        match &mut self.display {
-            Display::Bar(bar) => {
-                bar.set_position((BAR_LENGTH * (time - self.start) / (self.end - self.start)) as u64);
-                bar.set_message(text());
-            }
-            Display::Lines { last } if last.elapsed() >= LINE_INTERVAL => {
+        let is_due = |interval| self.last.is_none_or(|last| last.elapsed() >= interval);
+        match self.audience {
+            Audience::Person if !self.bar.is_hidden() => self.bar.set_message(text()),
+            Audience::Person if is_due(LINE_INTERVAL) => {
                 line(&text());
-                *last = Instant::now();
+                self.last = Some(Instant::now());
             }
-            Display::Json { last, held } => {
+            Audience::Program => {
                 let text = json!({
                     "event": "step", "step": step, "time": Number(time), "end": Number(end), "newton": newton, "krylov": krylov,
-                    "balance": balance.map(Number), "seconds": elapsed, "seconds_left": left,
+                    "balance": balance.map(Number), "seconds": self.since.elapsed().as_secs_f64(), "seconds_left": left.as_ref().map(Duration::as_secs_f64),
                 })
                 .to_string();
-                if last.is_none_or(|last| last.elapsed() >= JSON_INTERVAL) {
+                if is_due(JSON_INTERVAL) {
                     line(&text);
-                    (*last, *held) = (Some(Instant::now()), None);
+                    (self.last, self.held) = (Some(Instant::now()), None);
                 } else {
-                    *held = Some(text);
+                    self.held = Some(text);
                 }
             }
-            Display::Lines { .. } | Display::Silent => {}
+            Audience::Person | Audience::Nobody => {}
         }
     }
 
     /// Writes a warning for every audience.
     pub(crate) fn warn(&self, warning: &Warning) {
         let Warning { kind, time, step, message } = warning;
-        let text = format!("warning: t = {time}, step {step}: {message}");
-        match &self.display {
-            Display::Bar(bar) => bar.suspend(|| line(&text)),
-            Display::Json { .. } => {
-                let (kind, time) = (json!(kind), Number(*time));
-                line(
-                    &json!({"event": "warning", "kind": kind, "time": time, "step": step, "message": message})
-                        .to_string(),
-                );
+        let text = match self.audience {
+            Audience::Program => {
+                let time = Number(*time);
+                json!({"event": "warning", "kind": kind, "time": time, "step": step, "message": message}).to_string()
             }
-            Display::Lines { .. } | Display::Silent => line(&text),
-        }
+            _ => format!("warning: t = {time}, step {step}: {message}"),
+        };
+        self.bar.suspend(|| line(&text));
     }
 
     /// Removes the bar, or shows the line that was held back.
     pub fn finish(self) {
-        match self.display {
-            Display::Bar(bar) => bar.finish_and_clear(),
-            Display::Json { held: Some(text), .. } => line(&text),
-            _ => {}
-        }
-    }
-}
-
-/// Seconds in a readable unit.
-fn readable(seconds: f64) -> String {
-    match seconds {
-        s if s < 100.0 => format!("{s:.0} s"),
-        s if s < 6000.0 => format!("{:.0} min", s / 60.0),
-        s if s < 172_800.0 => format!("{:.1} h", s / 3600.0),
-        s => format!("{:.1} days", s / 86_400.0),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_estimate_follows_the_recent_pace() {
-        let mut pace = Pace::default();
-        assert_eq!(pace.left(10.0), None);
-        pace.mark(0.0, 0.0);
-        assert_eq!(pace.left(10.0), None);
-        // one unit a second for 5 s, then a tenth of that for longer than the window
-        pace.mark(5.0, 5.0);
-        assert_eq!(pace.left(10.0), Some(5.0));
-        for second in 1..=40 {
-            pace.mark(5.0 + f64::from(second), 5.0 + 0.1 * f64::from(second));
-        }
-        assert!(pace.left(10.0).is_some_and(|left| (left - 10.0).abs() < 1e-9), "{:?}", pace.left(10.0));
-        assert!(pace.marks.len() <= 32);
+        self.bar.finish_and_clear();
+        self.held.iter().for_each(|text| line(text));
     }
 }

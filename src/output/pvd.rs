@@ -1,51 +1,25 @@
 //! The series of snapshots as ParaView's `.pvd`: a list of times and files.
 
 use super::OutputError;
-use super::files::write_atomically;
-use std::fmt::Write as _;
-use std::io::Write as _;
+use super::files::{read_if_there, write_atomically};
+use std::io::Write;
 use std::path::{Path, PathBuf};
+
+/// The file of the series, in the directory of the run.
+pub(crate) const SERIES: &str = "particles.pvd";
 
 /// Text before and after the entries.
 const HEAD: &str = "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\" byte_order=\"LittleEndian\">\n<Collection>\n";
 const TAIL: &str = "</Collection>\n</VTKFile>\n";
 
-/// A growing series. The file is whole after every snapshot, so the series of a killed run still opens.
-#[derive(Clone, Debug)]
-pub(crate) struct Series {
-    path: PathBuf,
-    entries: String,
+/// The entry of `file`, given relative to the directory of the series.
+pub(crate) fn entry(time: f64, file: &str) -> String {
+    format!("<DataSet timestep=\"{time:?}\" part=\"0\" file=\"{file}\"/>\n")
 }
 
-impl Series {
-    /// An empty series; the file appears with its first snapshot.
-    pub fn new(path: PathBuf) -> Self {
-        Self { path, entries: String::new() }
-    }
-
-    /// Continues the series at `path` after its first `count` entries. Later entries are dropped.
-    ///
-    /// # Errors
-    /// The series has fewer entries, or the operating system refuses.
-    pub fn resume(path: PathBuf, count: usize) -> Result<Self, OutputError> {
-        let series = Self { entries: first_entries(&path, count)?, path };
-        series.write()?;
-        Ok(series)
-    }
-
-    /// Adds `file`, given relative to the directory of the series, and rewrites the list, all or nothing.
-    ///
-    /// # Errors
-    /// The operating system refuses.
-    pub fn push(&mut self, time: f64, file: &str) -> Result<(), OutputError> {
-        // Writing to a string cannot fail.
-        let _ = writeln!(self.entries, r#"<DataSet timestep="{time:?}" part="0" file="{file}"/>"#);
-        self.write()
-    }
-
-    fn write(&self) -> Result<(), OutputError> {
-        write_atomically(&self.path, |file| write!(file, "{HEAD}{}{TAIL}", self.entries))
-    }
+/// Writes the series, all or nothing. It is written anew with every snapshot, so the series of a killed run still opens.
+pub(crate) fn write(path: &Path, entries: &str) -> Result<(), OutputError> {
+    write_atomically(path, |file| write!(file, "{HEAD}{entries}{TAIL}"))
 }
 
 /// The first `count` entries of the series at `path`, one per line.
@@ -53,7 +27,23 @@ pub(crate) fn first_entries(path: &Path, count: usize) -> Result<String, OutputE
     let text = std::fs::read_to_string(path).map_err(OutputError::io("continue", path))?;
     let entries = text.strip_prefix(HEAD).and_then(|rest| rest.strip_suffix(TAIL)).unwrap_or_default();
     let kept: Vec<&str> = entries.split_inclusive('\n').take(count).collect();
-    if kept.len() == count { Ok(kept.concat()) } else { Err(OutputError::Shorter { path: path.to_owned() }) }
+    if kept.len() < count {
+        return Err(OutputError::content(path, "ends before the place where it was to be continued"));
+    }
+    Ok(kept.concat())
+}
+
+/// The existing files of the series in `directory`, in order of time; empty if there is no series.
+pub(crate) fn files(directory: &Path) -> Result<Vec<PathBuf>, OutputError> {
+    let path = directory.join(SERIES);
+    let Some(series) = read_if_there(&path)? else { return Ok(Vec::new()) };
+    let series = String::from_utf8_lossy(&series);
+    let names = series.split("file=\"").skip(1).filter_map(|rest| rest.split('"').next());
+    let files: Vec<_> = names.map(|name| directory.join(name)).collect();
+    if files.is_empty() {
+        return Err(OutputError::content(&path, "lists no snapshots"));
+    }
+    Ok(files.into_iter().filter(|file| file.is_file()).collect())
 }
 
 #[cfg(test)]
@@ -64,10 +54,11 @@ mod tests {
     fn the_series_is_whole_after_every_snapshot() -> Result<(), Box<dyn std::error::Error>> {
         let directory = tempfile::tempdir()?;
         let path = directory.path().join("particles.pvd");
-        let mut series = Series::new(path.clone());
+        let mut entries = String::new();
         let times = [0.0, 0.1 + 0.2, 1e-7];
         for (k, time) in times.into_iter().enumerate() {
-            series.push(time, &format!("particles_{k}.vtu"))?;
+            entries += &entry(time, &format!("particles_{k}.vtu"));
+            write(&path, &entries)?;
             let text = std::fs::read_to_string(&path)?;
             assert!(text.ends_with("</Collection>\n</VTKFile>\n"));
             let read: Vec<f64> = text
@@ -78,12 +69,21 @@ mod tests {
             assert_eq!(read, times[..=k]);
         }
         assert_eq!(std::fs::read_dir(directory.path())?.count(), 1, "no temporary file stays");
-        let whole = std::fs::read_to_string(&path)?;
-        let mut shorter = Series::resume(path.clone(), 2)?;
-        assert_eq!(std::fs::read_to_string(&path)?.matches("<DataSet").count(), 2);
-        shorter.push(times[2], "particles_2.vtu")?;
-        assert_eq!(std::fs::read_to_string(&path)?, whole);
-        assert!(matches!(Series::resume(path, 4), Err(OutputError::Shorter { .. })));
+        assert_eq!(first_entries(&path, 2)? + &entry(times[2], "particles_2.vtu"), entries);
+        assert!(matches!(first_entries(&path, 4), Err(OutputError::Content { .. })));
+        Ok(())
+    }
+
+    #[test]
+    fn a_series_without_files_is_damaged_and_none_is_none() -> Result<(), Box<dyn std::error::Error>> {
+        let folder = tempfile::tempdir()?;
+        assert!(files(folder.path())?.is_empty());
+        std::fs::write(folder.path().join(SERIES), "<VTKFile>")?;
+        assert!(files(folder.path()).is_err());
+        std::fs::write(folder.path().join(SERIES), r#"<DataSet file="a.vtu"/><DataSet part="0" file="b.vtu"/>"#)?;
+        assert!(files(folder.path())?.is_empty());
+        std::fs::write(folder.path().join("b.vtu"), "")?;
+        assert_eq!(files(folder.path())?, [folder.path().join("b.vtu")]);
         Ok(())
     }
 }

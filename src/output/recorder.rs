@@ -1,20 +1,22 @@
 //! The recorder, which writes all files of a run.
 
+use super::csv::{Row, Table};
 use super::earlier::remove_later_files;
 use super::files::Stream;
-use super::history::{Cost, Energies, History};
+use super::history::{self, Cost, Energies};
 use super::losses::Cause;
 use super::mark::Mark;
-use super::probes::{Probe, Probes};
-use super::progress::{Audience, Progress, Shown};
-use super::reactions::Reactions;
-use super::report::{Counts, NewtonLog, Outcome, Report, Seconds};
+use super::path::Point;
+use super::probes::{self, Probe};
+use super::progress::{Audience, Progress};
+use super::report::{self, Counts, Outcome, Seconds};
 use super::snapshots::Snapshots;
-use super::warnings::{Watch, Watched};
+use super::warnings::Watched;
 use super::{OutputError, Reference, Summary};
 use crate::approximation::ShapeFunction;
 use crate::field::Field;
 use crate::material::Law;
+use crate::mechanics::loads::Reaction;
 use crate::simulation::{Simulation, StepReport};
 use serde_json::{Map, Value};
 use std::path::PathBuf;
@@ -57,16 +59,16 @@ pub struct OutputSettings<const D: usize> {
 pub struct Recorder<const D: usize> {
     directory: PathBuf,
     reference: Reference<D>,
-    history: History,
-    reactions: Option<Reactions>,
-    probes: Option<Probes<D>>,
+    history: Table,
+    reactions: Option<Table>,
+    probes: Vec<Probe<D>>,
+    probed: Option<Table>,
     snapshots: Option<Snapshots>,
-    newton: NewtonLog,
+    newton: Stream,
     progress: Progress,
-    watch: Watch,
-    counts: Counts,
-    /// Seconds of all steps. The total counts the time before `since`.
-    seconds: Seconds,
+    /// The warnings, counts and seconds so far; the total of the seconds counts the time before `since`. Ends of files are those of the last
+    /// mark.
+    so_far: Mark,
     since: Instant,
     /// Whether a run may resume from a mark.
     marked: bool,
@@ -116,28 +118,35 @@ impl<const D: usize> Recorder<D> {
         let OutputSettings { directory, fields, snapshot_every, probes, end_time, audience } = settings;
         std::fs::create_dir_all(&directory).map_err(OutputError::io("create", &directory))?;
         remove_later_files(&directory, mark)?;
-        let at = |name: &str| directory.join(name);
+        let so_far = mark.cloned().unwrap_or_else(|| {
+            let particles = simulation.particles.solid_places().len();
+            Mark { counts: Counts { particles, ..Counts::default() }, ..Mark::default() }
+        });
         // A file that is not in the mark is created anew.
-        let kept = |name: &str| mark.and_then(|mark| mark.files.get(name).copied());
+        let kept = |name: &str| so_far.files.get(name).copied();
+        let table = |name: &str, row: &Row| Table::open(directory.join(name), row, kept(name));
+        // Only the names of the columns are needed here.
+        let history = table("history.csv", &history::row(simulation, &Energies::default(), Cost::default()))?;
         let loads = &simulation.loads;
-        let snapshots = mark.and_then(|mark| mark.snapshots).unwrap_or_default();
-        let begun = Counts { particles: simulation.particles.solid_places().len(), ..Counts::default() };
+        let no_reactions = vec![Reaction::NONE; loads.prescribed.len()];
+        let reactions = (!loads.prescribed.is_empty())
+            .then(|| table("reactions.csv", &history::reactions(0.0, loads, &no_reactions)))
+            .transpose()?;
+        let probed = (!probes.is_empty())
+            .then(|| table("probes.csv", &probes::row(&probes, simulation, &reference)?))
+            .transpose()?;
+        let written = so_far.snapshots.unwrap_or_default();
+        let snapshots =
+            snapshot_every.map(|every| Snapshots::new(directory.clone(), &fields, every, written)).transpose()?;
         Ok(Self {
-            history: History::open(at("history.csv"), simulation, kept("history.csv"))?,
-            reactions: (!loads.prescribed.is_empty())
-                .then(|| Reactions::open(at("reactions.csv"), loads, kept("reactions.csv")))
-                .transpose()?,
-            probes: (!probes.is_empty())
-                .then(|| Probes::open(at("probes.csv"), probes, kept("probes.csv")))
-                .transpose()?,
-            snapshots: snapshot_every
-                .map(|every| Snapshots::new(directory.clone(), &fields, every, snapshots))
-                .transpose()?,
-            newton: NewtonLog::open(at("newton.jsonl"), kept("newton.jsonl"))?,
+            history,
+            reactions,
+            probes,
+            probed,
+            snapshots,
+            newton: Stream::open(directory.join("newton.jsonl"), kept("newton.jsonl"))?,
             progress: Progress::new(simulation.clock.time(), end_time, audience),
-            watch: mark.map_or_else(Watch::default, |mark| mark.watch.clone()),
-            counts: mark.map_or(begun, |mark| mark.counts),
-            seconds: mark.map_or_else(Seconds::default, |mark| mark.seconds),
+            so_far,
             since: Instant::now(),
             marked: mark.is_some(),
             reference,
@@ -154,20 +163,19 @@ impl<const D: usize> Recorder<D> {
     /// The operating system refuses.
     pub fn mark(&mut self) -> Result<Mark, OutputError> {
         self.marked = true;
-        let files = self.streams().map(Stream::mark).collect::<Result<_, _>>()?;
-        let snapshots = self.snapshots.as_ref().map(Snapshots::mark);
-        let (watch, counts, seconds) = (self.watch.clone(), self.counts, self.seconds_so_far());
-        Ok(Mark { files, snapshots, watch, counts, seconds })
+        self.so_far.files = self.streams().map(Stream::mark).collect::<Result<_, _>>()?;
+        self.so_far.snapshots = self.snapshots.as_ref().map(|snapshots| snapshots.mark);
+        Ok(Mark { seconds: self.seconds_so_far(), ..self.so_far.clone() })
     }
 
     /// Adds the seconds in which the simulation was built, before the recorder started.
     pub fn count_set_up(&mut self, seconds: f64) {
-        self.seconds.set_up += seconds;
-        self.seconds.total += seconds;
+        self.so_far.seconds.set_up += seconds;
+        self.so_far.seconds.total += seconds;
     }
 
     fn seconds_so_far(&self) -> Seconds {
-        Seconds { total: self.seconds.total + self.since.elapsed().as_secs_f64(), ..self.seconds }
+        Seconds { total: self.so_far.seconds.total + self.since.elapsed().as_secs_f64(), ..self.so_far.seconds }
     }
 
     /// Records a successful step.
@@ -179,51 +187,41 @@ impl<const D: usize> Recorder<D> {
         simulation: &Simulation<D, L, A>,
         step: &StepReport<D>,
     ) -> Result<(), OutputError> {
-        self.counts.add(step);
-        self.seconds.add(step);
-        self.newton.write(simulation.clock.time(), step)?;
+        let (time, number) = (simulation.clock.time(), simulation.clock.steps());
+        let settings = &simulation.settings;
+        self.so_far.counts.add(step);
+        self.so_far.seconds.add(step);
+        let line = report::newton_line(time, step).map_err(std::io::Error::from);
+        self.newton.line(&line.map_err(OutputError::io("write", self.newton.path()))?)?;
         if let Some(reactions) = &mut self.reactions {
-            reactions.write(simulation.clock.time(), &simulation.loads, step)?;
+            reactions.write(&history::reactions(time, &simulation.loads, &step.reactions))?;
         }
         let newton = &step.newton.history;
         let (iterations, krylov) = (newton.iterations.len(), newton.counts.krylov_iterations);
         let cost = Cost { dt: step.dt, newton: iterations, krylov, yielding: step.yielding };
         let energies = self.write_state(simulation, cost)?;
-        let (time, number) = (simulation.clock.time(), simulation.clock.steps());
-        let newton_limit = simulation.settings.newton.max_iterations;
-        let failed = step.failed.iter().filter(|attempt| !attempt.inaccurate).count();
-        let error = step.error.zip(simulation.settings.error_tolerance);
-        let attempts = step.failed.iter().map(|attempt| &attempt.newton).chain([newton]);
-        let [limited, stagnated] = attempts.fold([0, 0], |[limited, stagnated], one| {
-            [limited + one.counts.krylov_limited, stagnated + one.counts.krylov_stagnated]
-        });
-        let krylov_limit = simulation.settings.newton.max_krylov_iterations;
-        let has_inertia = simulation.settings.scheme.has_inertia();
+        let attempts = || step.failed.iter().map(|attempt| &attempt.newton).chain([newton]);
         let seen = Watched {
             time,
             step: number,
+            settings,
             energies,
-            has_inertia,
             cause: Cause::of(step.feels_wall, !step.sharing.is_empty(), step.reset),
-            lumped: simulation.settings.lumping >= 1.0,
             cost,
-            failed,
-            error,
-            newton_limit,
-            limited,
-            stagnated,
-            krylov_limit,
+            failed: step.failed.iter().filter(|attempt| !attempt.inaccurate).count(),
+            error: step.error,
+            limited: attempts().map(|one| one.counts.krylov_limited).sum(),
+            stagnated: attempts().map(|one| one.counts.krylov_stagnated).sum(),
         };
-        self.watch.see(&seen).iter().for_each(|warning| self.progress.warn(warning));
+        let known = self.so_far.watch.warnings.len();
+        self.so_far.watch.see(&seen);
         let names: Vec<&str> = simulation.bodies.iter().map(|body| body.name.as_str()).collect();
-        self.watch.see_contact(&seen, &step.sharing, &names).iter().for_each(|warning| self.progress.warn(warning));
-        if simulation.settings.scheme.follows_path() {
-            let found = self.watch.see_path(&seen, simulation, &self.reference, step.straight);
-            found.iter().for_each(|warning| self.progress.warn(warning));
+        self.so_far.watch.see_contact(&seen, &step.sharing, &names);
+        if settings.scheme.follows_path() {
+            self.so_far.watch.see_path(&seen, Point::of(simulation, &self.reference), step.straight);
         }
-        let Cost { newton, krylov, .. } = cost;
-        self.progress
-            .show(time, Shown { step: number, newton, krylov, balance: has_inertia.then_some(energies.balance) });
+        self.so_far.watch.warnings[known..].iter().for_each(|warning| self.progress.warn(warning));
+        self.progress.show(time, number, &cost, settings.scheme.has_inertia().then_some(energies.balance));
         Ok(())
     }
 
@@ -239,34 +237,37 @@ impl<const D: usize> Recorder<D> {
         outcome: Outcome<'_>,
     ) -> Result<Summary, OutputError> {
         if let Outcome::Failed(error) = outcome {
-            self.counts.add_failed(&error.failed);
-            self.seconds.add_failed(&error.failed);
+            self.so_far.counts.add_failed(&error.failed);
+            self.so_far.seconds.add_failed(&error.failed);
         }
         if let Some(snapshots) = &mut self.snapshots {
             snapshots.write(simulation, &self.reference)?;
         }
         self.flush()?;
-        let (counts, time, seconds) = (self.counts, simulation.clock.time(), self.seconds_so_far());
-        self.watch.end(time, counts.steps).into_iter().for_each(|warning| self.progress.warn(warning));
-        self.progress.finish();
-        let energies = Energies::of(simulation, &self.reference);
+        let (time, known) = (simulation.clock.time(), self.so_far.watch.warnings.len());
+        self.so_far.watch.end(time, self.so_far.counts.steps);
+        self.so_far.watch.warnings[known..].iter().for_each(|warning| self.progress.warn(warning));
         let particles = &simulation.particles;
-        let mass = particles.mass.iter().sum();
-        let (warnings, contact) = (self.watch.warnings(), self.watch.contacts());
-        let report = Report { asked, outcome, time, mass, energies, counts, seconds, warnings, contact };
-        report.write(&self.directory.join("report.json"), self.newton, self.marked)?;
-        Ok(Summary {
+        let summary = Summary {
             time,
+            mass: particles.mass.iter().sum(),
             has_inertia: simulation.settings.scheme.has_inertia(),
-            energies,
+            energies: Energies::of(simulation, &self.reference),
             momentum_change: (particles.momentum() - self.reference.momentum).norm(),
-            krylov: simulation.krylov().0,
-            contact: self.watch.contacts().to_vec(),
-            warnings: self.watch.warnings().to_vec(),
             momentum_scale: particles.mass.iter().zip(&particles.velocity).fold(0.0, |sum, (m, v)| sum + m * v.norm()),
-            counts,
-            seconds,
-        })
+            krylov: simulation.krylov().0,
+            seconds: self.seconds_so_far(),
+            contact: self.so_far.watch.contacts,
+            warnings: self.so_far.watch.warnings,
+            counts: self.so_far.counts,
+        };
+        self.progress.finish();
+        let log = self.newton.path();
+        report::write(&self.directory.join("report.json"), log, asked, outcome, &summary)?;
+        if !self.marked {
+            std::fs::remove_file(log).map_err(OutputError::io("remove", log))?;
+        }
+        Ok(summary)
     }
 
     fn write_state<L: Law, A: ShapeFunction>(
@@ -274,12 +275,15 @@ impl<const D: usize> Recorder<D> {
         simulation: &Simulation<D, L, A>,
         cost: Cost,
     ) -> Result<Energies, OutputError> {
-        let energies = self.history.write(simulation, &self.reference, cost)?;
-        if let Some(probes) = &mut self.probes {
-            probes.write(simulation, &self.reference)?;
+        let energies = Energies::of(simulation, &self.reference);
+        self.history.write(&history::row(simulation, &energies, cost))?;
+        if let Some(table) = &mut self.probed {
+            table.write(&probes::row(&self.probes, simulation, &self.reference)?)?;
         }
-        if let Some(snapshots) = &mut self.snapshots {
-            snapshots.write_if_due(simulation, &self.reference)?;
+        if let Some(snapshots) = &mut self.snapshots
+            && snapshots.is_due(&simulation.clock)
+        {
+            snapshots.write(simulation, &self.reference)?;
         }
         Ok(energies)
     }
@@ -290,8 +294,7 @@ impl<const D: usize> Recorder<D> {
 
     /// All files that grow line by line.
     fn streams(&mut self) -> impl Iterator<Item = &mut Stream> {
-        let reactions = self.reactions.as_mut().map(|reactions| &mut reactions.0.0);
-        let probes = self.probes.as_mut().map(|probes| &mut probes.table.0);
-        [&mut self.history.table.0, &mut self.newton.0].into_iter().chain(reactions).chain(probes)
+        let tables = [Some(&mut self.history), self.reactions.as_mut(), self.probed.as_mut()];
+        std::iter::once(&mut self.newton).chain(tables.into_iter().flatten().map(|table| &mut table.0))
     }
 }

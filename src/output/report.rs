@@ -1,10 +1,8 @@
 //! `report.json`: settings, outcome and cost of a run, and the iterations and residuals of Newton's method in every step.
 
-use super::OutputError;
-use super::contact::Contact;
-use super::files::{Stream, Written, write_atomically};
+use super::files::write_atomically;
 use super::history::Energies;
-use super::warnings::Warning;
+use super::{OutputError, Summary};
 use crate::causes;
 use crate::phases::{Phase, Stopwatch};
 use crate::simulation::{AdvanceError, FailedAttempt, StepReport};
@@ -13,7 +11,7 @@ use serde::{Deserialize, Serialize, Serializer};
 use serde_json::{Map, Value, json};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Outcome of a run.
 #[derive(Clone, Copy, Debug)]
@@ -200,9 +198,20 @@ impl Serialize for Number {
     }
 }
 
-/// The iterations of one step or attempt in the report.
+fn numbers(list: impl IntoIterator<Item = f64>) -> Vec<Number> {
+    list.into_iter().map(Number).collect()
+}
+
+/// A step, or a failed attempt at a step, in the report.
 #[derive(Debug, Serialize)]
-struct NewtonLine {
+struct Attempt<'a> {
+    /// t_{n+1} of a step.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    time: Option<Number>,
+    dt: Number,
+    /// Cause of the failure of a failed attempt.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    why: Option<&'a str>,
     /// Iterations of the projection onto the nodes.
     projection_iterations: usize,
     /// ‖R‖ at the initial guess and after each iteration.
@@ -213,142 +222,86 @@ struct NewtonLine {
     krylov_residuals: Vec<Number>,
     /// All Krylov iterations, including linear systems that gave no Newton step.
     krylov_total: usize,
+    /// Failed attempts at a step.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    failed_attempts: Vec<Attempt<'a>>,
 }
 
-impl NewtonLine {
-    fn new(projection_iterations: usize, history: &NewtonHistory) -> Self {
+impl<'a> Attempt<'a> {
+    fn new(dt: f64, projection_iterations: usize, history: &NewtonHistory) -> Self {
         let iterations = &history.iterations;
         let residuals = history.first_residual.into_iter().chain(iterations.iter().map(|one| one.residual));
         Self {
+            time: None,
+            dt: Number(dt),
+            why: None,
             projection_iterations,
-            newton_residuals: residuals.map(Number).collect(),
+            newton_residuals: numbers(residuals),
             krylov_iterations: iterations.iter().map(|one| one.krylov.iterations).collect(),
-            krylov_residuals: iterations.iter().map(|one| Number(one.krylov.relative_residual)).collect(),
+            krylov_residuals: numbers(iterations.iter().map(|one| one.krylov.relative_residual)),
             krylov_total: history.counts.krylov_iterations,
+            failed_attempts: Vec::new(),
         }
     }
-}
 
-/// A failed attempt in the report.
-#[derive(Debug, Serialize)]
-struct AttemptLine<'a> {
-    dt: Number,
-    why: &'a str,
-    #[serde(flatten)]
-    newton: NewtonLine,
-}
-
-impl<'a> AttemptLine<'a> {
-    fn all(attempts: &'a [FailedAttempt]) -> Vec<Self> {
-        let line = |one: &'a FailedAttempt| {
-            let newton = NewtonLine::new(one.projection_iterations, &one.newton);
-            Self { dt: Number(one.dt), why: &one.why, newton }
+    fn failed(attempts: &'a [FailedAttempt]) -> Vec<Self> {
+        let line = |one: &'a FailedAttempt| Self {
+            why: Some(&one.why),
+            ..Self::new(one.dt, one.projection_iterations, &one.newton)
         };
         attempts.iter().map(line).collect()
     }
 }
 
-/// A step in the report.
-#[derive(Debug, Serialize)]
-struct StepLine<'a> {
-    /// t_{n+1}
-    time: Number,
-    dt: Number,
-    #[serde(flatten)]
-    newton: NewtonLine,
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    failed_attempts: Vec<AttemptLine<'a>>,
+/// The line in `newton.jsonl` of a step that ended at `time`: iterations and residuals of Newton's method.
+pub(crate) fn newton_line<const D: usize>(time: f64, step: &StepReport<D>) -> serde_json::Result<String> {
+    serde_json::to_string(&Attempt {
+        time: Some(Number(time)),
+        failed_attempts: Attempt::failed(&step.failed),
+        ..Attempt::new(step.dt, step.projection_iterations, &step.newton.history)
+    })
 }
 
-/// `newton.jsonl`: iterations and residuals of Newton's method, one line per step, written during the run.
-#[derive(Debug)]
-pub(crate) struct NewtonLog(pub(crate) Stream);
-
-impl NewtonLog {
-    /// Creates the file, or continues a file after its first `kept` bytes.
-    pub(crate) fn open(path: PathBuf, kept: Option<Written>) -> Result<Self, OutputError> {
-        Stream::open(path, kept).map(Self)
-    }
-
-    /// Appends a step that ended at `time`.
-    pub(crate) fn write<const D: usize>(&mut self, time: f64, step: &StepReport<D>) -> Result<(), OutputError> {
-        let line = StepLine {
-            time: Number(time),
-            dt: Number(step.dt),
-            newton: NewtonLine::new(step.projection_iterations, &step.newton.history),
-            failed_attempts: AttemptLine::all(&step.failed),
-        };
-        self.0.line(&serde_json::to_string(&line).map_err(failed(self.0.path()))?)
-    }
-}
-
-fn failed(path: &Path) -> impl FnOnce(serde_json::Error) -> OutputError {
-    move |source| OutputError::Json { path: path.to_owned(), source }
-}
-
-/// The report of a run.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Report<'a> {
-    /// Entries that the caller adds.
-    pub asked: &'a Map<String, Value>,
-    /// Outcome of the run.
-    pub outcome: Outcome<'a>,
-    /// Time reached.
-    pub time: f64,
-    /// Mass of all bodies.
-    pub mass: f64,
-    /// Energies at the end.
-    pub energies: Energies,
-    /// Counts over all steps.
-    pub counts: Counts,
-    /// Seconds of the run by phase.
-    pub seconds: Seconds,
-    /// Warnings of the run.
-    pub warnings: &'a [Warning],
-    /// Bodies that shared nodes.
-    pub contact: &'a [Contact],
-}
-
-impl Report<'_> {
-    /// Writes the report, all or nothing. The lines of `log` become its steps. Afterwards `log` is removed, unless it is `kept`.
-    pub(crate) fn write(&self, path: &Path, mut log: NewtonLog, kept: bool) -> Result<(), OutputError> {
-        log.0.flush()?;
-        let log = log.0.path();
-        let head = serde_json::to_string_pretty(&self.head()).map_err(failed(path))?;
-        let lines = BufReader::new(File::open(log).map_err(OutputError::io("read", log))?).lines();
-        write_atomically(path, |file| {
-            // The object is left open for one more key.
-            write!(file, "{},\n  \"steps\": [", head.strip_suffix("\n}").unwrap_or(&head))?;
-            for (k, line) in lines.enumerate() {
-                write!(file, "{}\n    {}", if k == 0 { "" } else { "," }, line?)?;
-            }
-            file.write_all(b"\n  ]\n}\n")
-        })?;
-        if kept { Ok(()) } else { std::fs::remove_file(log).map_err(OutputError::io("remove", log)) }
-    }
-
-    fn head(&self) -> Value {
-        let Energies { kinetic, strain, external, dissipated, by_laws, initial, total, balance } = self.energies;
-        let seconds = self.seconds.named().chain([("total", self.seconds.total)]);
-        let seconds: Map<_, _> = seconds.map(|(name, x)| (name.to_owned(), json!(Number(x)))).collect();
-        let (outcome, message) = self.outcome.words(self.time);
-        let mut head = json!({
-            "program": concat!("bfree ", env!("CARGO_PKG_VERSION")), "outcome": outcome, "message": message,
-            "time": Number(self.time), "mass": Number(self.mass),
-            "energies": {
-                "kinetic": Number(kinetic), "strain": Number(strain), "external": Number(external),
-                "dissipated": Number(dissipated), "dissipated_by_laws": Number(by_laws), "initial": Number(initial),
-                "total": Number(total), "balance": Number(balance),
-            },
-            "counts": self.counts, "seconds": seconds, "warnings": self.warnings,
-            "contact": self.contact,
-        });
-        if let Outcome::Failed(error) = self.outcome {
-            head["failed_attempts"] = json!(AttemptLine::all(&error.failed));
+/// Writes `report.json`, all or nothing, with the entries `asked` of the caller. The lines of `newton.jsonl` at `log` become its steps.
+pub(crate) fn write(
+    path: &Path,
+    log: &Path,
+    asked: &Map<String, Value>,
+    outcome: Outcome<'_>,
+    summary: &Summary,
+) -> Result<(), OutputError> {
+    let lines = BufReader::new(File::open(log).map_err(OutputError::io("read", log))?).lines();
+    write_atomically(path, |file| {
+        let head = serde_json::to_string_pretty(&head(asked, outcome, summary))?;
+        // The object is left open for one more key.
+        write!(file, "{},\n  \"steps\": [", head.strip_suffix("\n}").unwrap_or(&head))?;
+        for (k, line) in lines.enumerate() {
+            write!(file, "{}\n    {}", if k == 0 { "" } else { "," }, line?)?;
         }
-        self.asked.iter().for_each(|(key, value)| head[key] = value.clone());
-        head
+        file.write_all(b"\n  ]\n}\n")
+    })
+}
+
+fn head(asked: &Map<String, Value>, outcome: Outcome<'_>, summary: &Summary) -> Value {
+    let Energies { kinetic, strain, external, dissipated, by_laws, initial, total, balance } = summary.energies;
+    let seconds = summary.seconds.named().chain([("total", summary.seconds.total)]);
+    let seconds: Map<_, _> = seconds.map(|(name, x)| (name.to_owned(), json!(Number(x)))).collect();
+    let (word, message) = outcome.words(summary.time);
+    let mut head = json!({
+        "program": concat!("bfree ", env!("CARGO_PKG_VERSION")), "outcome": word, "message": message,
+        "time": Number(summary.time), "mass": Number(summary.mass),
+        "energies": {
+            "kinetic": Number(kinetic), "strain": Number(strain), "external": Number(external),
+            "dissipated": Number(dissipated), "dissipated_by_laws": Number(by_laws), "initial": Number(initial),
+            "total": Number(total), "balance": Number(balance),
+        },
+        "counts": summary.counts, "seconds": seconds, "warnings": summary.warnings, "contact": summary.contact,
+    });
+    if let Outcome::Failed(error) = outcome {
+        head["failed_attempts"] = json!(Attempt::failed(&error.failed));
     }
+    asked.iter().for_each(|(key, value)| head[key] = value.clone());
+    head
 }
 
 #[cfg(test)]
@@ -358,33 +311,15 @@ mod tests {
     #[test]
     fn the_lines_of_every_step_end_in_the_report_and_nothing_becomes_null() -> Result<(), Box<dyn std::error::Error>> {
         let directory = tempfile::tempdir()?;
-        let energies = Energies {
-            kinetic: f64::NAN,
-            strain: 0.1,
-            external: 0.0,
-            dissipated: 0.0,
-            by_laws: 0.0,
-            initial: 0.0,
-            total: f64::INFINITY,
-            balance: 0.0,
-        };
-        let settings = serde_json::json!({"nested": {"deep": {}}});
-        let report = Report {
-            asked: &Map::from_iter([("settings".to_owned(), settings.clone())]),
-            outcome: Outcome::Finished,
-            time: 0.1 + 0.2,
-            mass: 1.0,
-            energies,
-            counts: Counts::default(),
-            seconds: Seconds::default(),
-            warnings: &[],
-            contact: &[],
-        };
+        let energies = Energies { kinetic: f64::NAN, strain: 0.1, total: f64::INFINITY, ..Energies::default() };
+        let settings = json!({"nested": {"deep": {}}});
+        let asked = Map::from_iter([("settings".to_owned(), settings.clone())]);
+        let summary = Summary { time: 0.1 + 0.2, energies, ..Summary::default() };
         for lines in [&[][..], &["[1.0,1e-9]"], &["[1.0,1e-9]", "[]", "[2.5]"]] {
-            let mut log = NewtonLog::open(directory.path().join("newton.jsonl"), None)?;
-            lines.iter().try_for_each(|line| log.0.line(line))?;
+            let log = directory.path().join("newton.jsonl");
+            std::fs::write(&log, lines.iter().map(|line| format!("{line}\n")).collect::<String>())?;
             let path = directory.path().join("report.json");
-            report.write(&path, log, false)?;
+            write(&path, &log, &asked, Outcome::Finished, &summary)?;
             let read: Value = serde_json::from_slice(&std::fs::read(&path)?)?;
             let residuals: Vec<Value> =
                 lines.iter().map(|line| serde_json::from_str(line)).collect::<Result<_, _>>()?;
@@ -392,7 +327,6 @@ mod tests {
             assert_eq!((&read["settings"], &read["outcome"]), (&settings, &"finished".into()));
             assert_eq!((&read["energies"]["kinetic"], &read["energies"]["total"]), (&"NaN".into(), &"inf".into()));
             assert_eq!(read["time"], 0.1 + 0.2);
-            assert!(!directory.path().join("newton.jsonl").exists());
         }
         Ok(())
     }

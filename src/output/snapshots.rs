@@ -1,8 +1,8 @@
 //! Snapshots of the particles: `particles_*.vtu`, and the series `particles.pvd`.
 
 use super::fields::padded;
-use super::pvd::{Series, first_entries};
-use super::vtu::{Array, Background, Snapshot, Values};
+use super::pvd::{self, SERIES};
+use super::vtu::{Array, Background, Snapshot};
 use super::{OutputError, Reference};
 use crate::clock::Clock;
 use crate::field::{Field, Kind};
@@ -11,18 +11,16 @@ use crate::simulation::Simulation;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// The file of the series, in the directory of the run.
-pub(crate) const SERIES: &str = "particles.pvd";
-
 /// Writes snapshots.
 #[derive(Debug)]
 pub(crate) struct Snapshots {
     directory: PathBuf,
     fields: Vec<Field>,
-    series: Series,
+    /// The entries of the series.
+    entries: String,
     /// Time between snapshots.
     every: f64,
-    mark: SnapshotMark,
+    pub(crate) mark: SnapshotMark,
 }
 
 /// Progress of the snapshots of a run, for a checkpoint.
@@ -46,7 +44,7 @@ impl SnapshotMark {
     pub(crate) fn check(&self, directory: &Path) -> Result<(), OutputError> {
         // Nothing is written before the first snapshot.
         if self.written > 0 {
-            first_entries(&directory.join(SERIES), self.written)?;
+            pvd::first_entries(&directory.join(SERIES), self.written)?;
         }
         Ok(())
     }
@@ -76,35 +74,24 @@ impl Snapshots {
         if !(every > 0.0 && every.is_finite()) {
             return Err(OutputError::SnapshotEvery(every));
         }
-        let mut unique = Vec::new();
-        for &field in fields {
-            if !unique.contains(&field) {
-                unique.push(field);
-            }
+        let unique = fields.iter().enumerate().filter(|&(k, field)| !fields[..k].contains(field));
+        let mut entries = String::new();
+        if mark.written > 0 {
+            let path = directory.join(SERIES);
+            entries = pvd::first_entries(&path, mark.written)?;
+            pvd::write(&path, &entries)?;
         }
-        let path = directory.join(SERIES);
-        let series = if mark.written > 0 { Series::resume(path, mark.written)? } else { Series::new(path) };
-        Ok(Self { directory, fields: unique, series, every, mark })
+        Ok(Self { fields: unique.map(|(_, &field)| field).collect(), directory, entries, every, mark })
     }
 
-    /// The progress of the snapshots.
-    pub(crate) fn mark(&self) -> SnapshotMark {
-        self.mark
-    }
-
-    /// Writes the present state if the time has reached a multiple of `every` since the last snapshot, or if there is none yet.
-    pub(crate) fn write_if_due<const D: usize, L: Law, A>(
-        &mut self,
-        simulation: &Simulation<D, L, A>,
-        reference: &Reference<D>,
-    ) -> Result<(), OutputError> {
-        let clock = &simulation.clock;
+    /// Whether the time has reached a multiple of `every` since the last call that was due, or there was no such call.
+    pub(crate) fn is_due(&mut self, clock: &Clock) -> bool {
         let passed = multiples(clock, self.every);
-        if self.mark.passed.is_none_or(|before| passed > before) {
+        let is_due = self.mark.passed.is_none_or(|before| passed > before);
+        if is_due {
             self.mark.passed = Some(passed);
-            self.write(simulation, reference)?;
         }
-        Ok(())
+        is_due
     }
 
     /// Writes the present state, unless it is already written.
@@ -119,7 +106,8 @@ impl Snapshots {
         }
         let file = name(self.mark.written);
         snapshot(simulation, reference, &self.fields)?.write(&self.directory.join(&file))?;
-        self.series.push(simulation.clock.time(), &file)?;
+        self.entries += &pvd::entry(simulation.clock.time(), &file);
+        pvd::write(&self.directory.join(SERIES), &self.entries)?;
         self.mark.written += 1;
         self.mark.last = Some(step);
         Ok(())
@@ -141,12 +129,12 @@ pub(crate) fn snapshot<const D: usize, L: Law, A>(
     let (grid, particles) = (&simulation.grid, &simulation.particles);
     let places = particles.solid_places();
     let arrays = fields.iter().map(|field| {
-        let values = match field.kind() {
-            Kind::Index => Values::Index(places.iter().map(|&p| particles.body[p as usize]).collect()),
-            _ => Values::Float(field.values(simulation, reference)?),
-        };
-        let components = field.kind().components().iter().map(|&name| name.to_owned()).collect();
-        Ok(Array { name: field.name().to_owned(), components, values })
+        Ok(Array {
+            name: field.name().to_owned(),
+            components: field.kind().components().iter().map(|&name| name.to_owned()).collect(),
+            values: field.values(simulation, reference)?,
+            is_index: field.kind() == Kind::Index,
+        })
     });
     Ok(Snapshot {
         time: simulation.clock.time(),

@@ -8,10 +8,12 @@ use crate::solver::Krylov;
 use std::fmt::{Display, Formatter, Result};
 
 /// A run in a few lines.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Summary {
     /// Time reached.
     pub time: f64,
+    /// Mass of all bodies.
+    pub mass: f64,
     /// Whether there is inertia. Without inertia, kinetic energy and momentum are zero. Loads then act at once and lose the excess of work
     /// over energy.
     pub has_inertia: bool,
@@ -42,28 +44,20 @@ impl Display for Summary {
             "{} steps to t = {time} in {:.1} s: {} particles, up to {} active nodes, {} failed attempts",
             counts.steps, seconds.total, counts.particles, counts.max_active_nodes, counts.failed_attempts
         )?;
+        let Energies { kinetic, strain, total, external, dissipated, by_laws, initial, balance } = energies;
+        let size = balance.abs();
+        let terms = format!(
+            "initial {initial:.6e} + external work {external:.6e} - dissipated {dissipated:.6e} (by laws {by_laws:.6e})"
+        );
         if self.has_inertia {
-            let Energies { kinetic, strain, total, external, dissipated, by_laws, initial, balance } = energies;
+            let error = if *balance > 0.0 { "+ created" } else { "- lost" };
             writeln!(f, "energy    kinetic {kinetic:.6e}, strain {strain:.6e}, total {total:.6e}")?;
-            let (error, size) = if *balance > 0.0 { ("+ created", *balance) } else { ("- lost", -balance) };
-            writeln!(
-                f,
-                "balance   total {total:.6e} = initial {initial:.6e} + external work {external:.6e} - dissipated {dissipated:.6e} (by laws \
-                 {by_laws:.6e}) {error} {size:.3e}"
-            )?;
-            writeln!(
-                f,
-                "momentum  changed by {:.3e}; sum of m |v| is {:.3e}",
-                self.momentum_change, self.momentum_scale
-            )?;
+            writeln!(f, "balance   total {total:.6e} = {terms} {error} {size:.3e}")?;
+            let [change, scale] = [self.momentum_change, self.momentum_scale];
+            writeln!(f, "momentum  changed by {change:.3e}; sum of m |v| is {scale:.3e}")?;
         } else {
-            let Energies { strain, external, dissipated, by_laws, initial, balance, .. } = energies;
-            let (error, size) = if *balance > 0.0 { ("+", *balance) } else { ("-", -balance) };
-            writeln!(
-                f,
-                "energy    strain {strain:.6e} = initial {initial:.6e} + external work {external:.6e} - dissipated {dissipated:.6e} (by laws \
-                 {by_laws:.6e}) {error} rest of the load steps {size:.3e}"
-            )?;
+            let sign = if *balance > 0.0 { "+" } else { "-" };
+            writeln!(f, "energy    strain {strain:.6e} = {terms} {sign} rest of the load steps {size:.3e}")?;
         }
         writeln!(
             f,
@@ -78,10 +72,7 @@ impl Display for Summary {
         for Warning { time, step, message, .. } in &self.warnings {
             writeln!(f, "warned    t = {time}, step {step}: {message}")?;
         }
-        write!(f, "seconds  ")?;
-        for (k, (name, x)) in seconds.named().enumerate() {
-            write!(f, "{} {} {x:.2}", if k == 0 { "" } else { "," }, name.replace('_', " "))?;
-        }
-        Ok(())
+        let seconds = seconds.named().map(|(name, x)| format!("{} {x:.2}", name.replace('_', " ")));
+        write!(f, "seconds   {}", seconds.collect::<Vec<_>>().join(", "))
     }
 }

@@ -5,26 +5,17 @@
 
 use super::OutputError;
 use super::files::write_atomically;
+use crate::field::column;
 use flate2::Compression;
 use flate2::read::{ZlibDecoder, ZlibEncoder};
-use std::fmt::Write as _;
-use std::io::{Read, Write as _};
-use std::path::{Path, PathBuf};
+use std::io::{Read, Write};
+use std::path::Path;
 
 /// Bytes of an uncompressed block.
 const BLOCK: usize = 1 << 16;
 
 /// VTK's type of a cell that is one point.
 const VERTEX: u8 = 1;
-
-/// The numbers of an array.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Values {
-    /// `Float64`
-    Float(Vec<f64>),
-    /// `UInt32`
-    Index(Vec<u32>),
-}
 
 /// An array with one tuple for each point.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,7 +25,16 @@ pub struct Array {
     /// Names of the components; one empty name for a scalar.
     pub components: Vec<String>,
     /// All components of the first point, then of the next.
-    pub values: Values,
+    pub values: Vec<f64>,
+    /// Whether all values are whole numbers, which the file holds as `UInt32` instead of `Float64`.
+    pub is_index: bool,
+}
+
+impl Array {
+    /// The names of the components, as in a table.
+    pub(crate) fn columns(&self) -> Vec<String> {
+        self.components.iter().map(|component| column(&self.name, component)).collect()
+    }
 }
 
 /// The background grid of a snapshot, kept as field data so that a picture can show the grid.
@@ -62,9 +62,9 @@ impl Background {
 /// Points with arrays, at one time.
 ///
 /// ```
-/// use bfree::output::vtu::{Array, Background, Snapshot, Values};
+/// use bfree::output::vtu::{Array, Background, Snapshot};
 ///
-/// let speed = Array { name: "speed".into(), components: vec!["".into()], values: Values::Float(vec![0.1 + 0.2, -0.0]) };
+/// let speed = Array { name: "speed".into(), components: vec!["".into()], values: vec![0.1 + 0.2, -0.0], is_index: false };
 /// let snapshot = Snapshot {
 ///     time: 1.0 / 3.0,
 ///     background: Background { dimension: 1, origin: [0.0; 3], spacing: 0.5, cells: [4, 0, 0] },
@@ -89,55 +89,40 @@ pub struct Snapshot {
     pub arrays: Vec<Array>,
 }
 
-/// A file cannot be read as a snapshot of bfree.
-#[derive(Debug, thiserror::Error)]
-pub enum ReadError {
-    /// The operating system refused.
-    #[error("cannot read {}: {source}", path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// Reason given by the operating system.
-        source: std::io::Error,
-    },
-    /// The content does not have the format of [`Snapshot::write`].
-    #[error("{} is not a snapshot written by bfree: {what}", path.display())]
-    Format {
-        /// The file.
-        path: PathBuf,
-        /// Description of the missing or wrong part.
-        what: String,
-    },
+/// A file under construction: the XML, and the appended data to which it refers by offsets.
+#[derive(Default)]
+struct Parts {
+    xml: String,
+    data: Vec<u8>,
 }
 
-/// The appended data, to which the XML refers by offsets.
-#[derive(Default)]
-struct Appended(Vec<u8>);
-
-impl Appended {
-    /// Appends `[blocks, block size, size of the last block if smaller, compressed sizes …]` and the compressed blocks; returns the offset.
-    fn push(&mut self, bytes: &[u8]) -> usize {
-        let offset = self.0.len();
-        let blocks: Vec<Vec<u8>> = bytes.chunks(BLOCK).map(compressed).collect();
-        let mut header = vec![blocks.len() as u64, BLOCK as u64, (bytes.len() % BLOCK) as u64];
-        header.extend(blocks.iter().map(|block| block.len() as u64));
-        self.0.extend(header.iter().flat_map(|word| word.to_le_bytes()));
-        self.0.extend(blocks.iter().flatten());
-        offset
-    }
-
-    /// Appends an array and writes its XML element.
-    fn array(&mut self, xml: &mut String, vtk_type: &str, name: &str, components: &[String], bytes: &[u8]) {
-        let offset = self.push(bytes);
-        let _ = write!(xml, r#"<DataArray type="{vtk_type}" Name="{name}""#);
+impl Parts {
+    /// An array: its XML element, and as data `[blocks, block size, size of the last block if smaller, compressed sizes …]` and the
+    /// compressed blocks.
+    fn array(&mut self, vtk_type: &str, name: &str, components: &[impl AsRef<str>], bytes: &[u8]) {
+        self.xml += &format!(r#"<DataArray type="{vtk_type}" Name="{name}""#);
         // Without NumberOfComponents, readers give a scalar as a plain list.
         if components.len() != 1 {
-            let _ = write!(xml, r#" NumberOfComponents="{}""#, components.len());
+            self.xml += &format!(r#" NumberOfComponents="{}""#, components.len());
         }
-        for (k, component) in components.iter().enumerate().filter(|(_, component)| !component.is_empty()) {
-            let _ = write!(xml, r#" ComponentName{k}="{component}""#);
+        for (k, component) in components.iter().map(AsRef::as_ref).enumerate().filter(|(_, name)| !name.is_empty()) {
+            self.xml += &format!(r#" ComponentName{k}="{component}""#);
         }
-        let _ = writeln!(xml, r#" format="appended" offset="{offset}"/>"#);
+        self.xml += &format!(" format=\"appended\" offset=\"{}\"/>\n", self.data.len());
+        let blocks: Vec<Vec<u8>> = bytes.chunks(BLOCK).map(compressed).collect();
+        let header = [blocks.len(), BLOCK, bytes.len() % BLOCK].into_iter().chain(blocks.iter().map(Vec::len));
+        self.data.extend(header.flat_map(|word| (word as u64).to_le_bytes()));
+        self.data.extend(blocks.iter().flatten());
+    }
+
+    /// An array of field data, as text.
+    fn field(&mut self, vtk_type: &str, name: &str, numbers: &[impl std::fmt::Debug]) {
+        let text: Vec<String> = numbers.iter().map(|x| format!("{x:?}")).collect();
+        self.xml += &format!(
+            "<DataArray type=\"{vtk_type}\" Name=\"{name}\" NumberOfTuples=\"{}\" format=\"ascii\">{}</DataArray>\n",
+            numbers.len(),
+            text.join(" ")
+        );
     }
 }
 
@@ -148,21 +133,8 @@ fn compressed(block: &[u8]) -> Vec<u8> {
     out
 }
 
-fn bytes_of(values: &Values) -> (&'static str, Vec<u8>) {
-    match values {
-        Values::Float(values) => ("Float64", values.iter().flat_map(|x| x.to_le_bytes()).collect()),
-        Values::Index(values) => ("UInt32", values.iter().flat_map(|x| x.to_le_bytes()).collect()),
-    }
-}
-
-/// An array of field data, as text.
-fn field_data(xml: &mut String, vtk_type: &str, name: &str, numbers: &[impl std::fmt::Debug]) {
-    let text: Vec<String> = numbers.iter().map(|x| format!("{x:?}")).collect();
-    let (count, text) = (numbers.len(), text.join(" "));
-    let _ = writeln!(
-        xml,
-        r#"<DataArray type="{vtk_type}" Name="{name}" NumberOfTuples="{count}" format="ascii">{text}</DataArray>"#
-    );
+fn bytes(values: &[f64]) -> Vec<u8> {
+    values.iter().flat_map(|x| x.to_le_bytes()).collect()
 }
 
 impl Snapshot {
@@ -171,37 +143,37 @@ impl Snapshot {
     /// # Errors
     /// The operating system refuses.
     pub fn write(&self, path: &Path) -> Result<(), OutputError> {
-        let mut data = Appended::default();
-        let mut xml = String::from(
-            "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" \
-             header_type=\"UInt64\" compressor=\"vtkZLibDataCompressor\">\n<UnstructuredGrid>\n<FieldData>\n",
-        );
-        let background = &self.background;
-        field_data(&mut xml, "Float64", "TimeValue", &[self.time]);
-        field_data(&mut xml, "UInt32", "grid_dimension", &[background.dimension]);
-        field_data(&mut xml, "Float64", "grid_origin", &background.origin);
-        field_data(&mut xml, "Float64", "grid_spacing", &[background.spacing]);
-        field_data(&mut xml, "UInt32", "grid_cells", &background.cells);
+        let mut parts = Parts::default();
+        parts.xml += "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" \
+             header_type=\"UInt64\" compressor=\"vtkZLibDataCompressor\">\n<UnstructuredGrid>\n<FieldData>\n";
+        let Background { dimension, origin, spacing, cells } = &self.background;
+        parts.field("Float64", "TimeValue", &[self.time]);
+        parts.field("UInt32", "grid_dimension", &[dimension]);
+        parts.field("Float64", "grid_origin", origin);
+        parts.field("Float64", "grid_spacing", &[spacing]);
+        parts.field("UInt32", "grid_cells", cells);
         let count = self.points.len();
-        let _ =
-            writeln!(xml, "</FieldData>\n<Piece NumberOfPoints=\"{count}\" NumberOfCells=\"{count}\">\n<PointData>");
-        for array in &self.arrays {
-            let (vtk_type, bytes) = bytes_of(&array.values);
-            data.array(&mut xml, vtk_type, &array.name, &array.components, &bytes);
+        parts.xml +=
+            &format!("</FieldData>\n<Piece NumberOfPoints=\"{count}\" NumberOfCells=\"{count}\">\n<PointData>\n");
+        for Array { name, components, values, is_index } in &self.arrays {
+            if *is_index {
+                let whole: Vec<u8> = values.iter().flat_map(|&x| (x as u32).to_le_bytes()).collect();
+                parts.array("UInt32", name, components, &whole);
+            } else {
+                parts.array("Float64", name, components, &bytes(values));
+            }
         }
-        xml.push_str("</PointData>\n<Points>\n");
-        let points: Vec<u8> = self.points.iter().flatten().flat_map(|x| x.to_le_bytes()).collect();
-        data.array(&mut xml, "Float64", "Points", &["x", "y", "z"].map(str::to_owned), &points);
-        xml.push_str("</Points>\n<Cells>\n");
-        let scalar = [String::new()];
+        parts.xml += "</PointData>\n<Points>\n";
+        parts.array("Float64", "Points", &["x", "y", "z"], &bytes(self.points.as_flattened()));
+        parts.xml += "</Points>\n<Cells>\n";
         let integers = |first: i64| (first..first + count as i64).flat_map(i64::to_le_bytes).collect::<Vec<u8>>();
-        data.array(&mut xml, "Int64", "connectivity", &scalar, &integers(0));
-        data.array(&mut xml, "Int64", "offsets", &scalar, &integers(1));
-        data.array(&mut xml, "UInt8", "types", &scalar, &vec![VERTEX; count]);
-        xml.push_str("</Cells>\n</Piece>\n</UnstructuredGrid>\n<AppendedData encoding=\"raw\">\n_");
+        parts.array("Int64", "connectivity", &[""], &integers(0));
+        parts.array("Int64", "offsets", &[""], &integers(1));
+        parts.array("UInt8", "types", &[""], &vec![VERTEX; count]);
+        parts.xml += "</Cells>\n</Piece>\n</UnstructuredGrid>\n<AppendedData encoding=\"raw\">\n_";
         write_atomically(path, |file| {
-            file.write_all(xml.as_bytes())?;
-            file.write_all(&data.0)?;
+            file.write_all(parts.xml.as_bytes())?;
+            file.write_all(&parts.data)?;
             file.write_all(b"\n</AppendedData>\n</VTKFile>\n")
         })
     }
@@ -210,9 +182,10 @@ impl Snapshot {
     ///
     /// # Errors
     /// The operating system refuses, or the file is not a snapshot, or is damaged.
-    pub fn read(path: &Path) -> Result<Self, ReadError> {
-        let content = std::fs::read(path).map_err(|source| ReadError::Io { path: path.to_owned(), source })?;
-        Self::parse(&content).map_err(|what| ReadError::Format { path: path.to_owned(), what })
+    pub fn read(path: &Path) -> Result<Self, OutputError> {
+        let content = std::fs::read(path).map_err(OutputError::io("read", path))?;
+        Self::parse(&content)
+            .map_err(|what| OutputError::content(path, format!("is not a snapshot written by bfree: {what}")))
     }
 
     fn parse(content: &[u8]) -> Result<Self, String> {
@@ -239,19 +212,13 @@ impl Snapshot {
             .split_once("<Piece")
             .and_then(|(_, piece)| attribute(piece.split('>').next()?, "NumberOfPoints")?.parse::<usize>().ok())
             .ok_or("no number of points")?;
-        let mut points = None;
-        let mut arrays = Vec::new();
-        for (tag, _) in elements(xml).filter(|(tag, _)| attribute(tag, "format") == Some("appended")) {
-            let array = read_array(tag, data, count)?;
-            match array {
-                Some(Array { name, values: Values::Float(values), .. }) if name == "Points" => {
-                    points = Some(values.chunks_exact(3).map(|x| [x[0], x[1], x[2]]).collect());
-                }
-                Some(array) => arrays.push(array),
-                None => {}
-            }
-        }
-        Ok(Self { time, background, points: points.ok_or("no points")?, arrays })
+        // The arrays of the cells have other types and hold no information.
+        let holds_numbers = |tag: &str| matches!(attribute(tag, "type"), Some("Float64" | "UInt32"));
+        let appended = |tag: &str| attribute(tag, "format") == Some("appended") && holds_numbers(tag);
+        let tags = elements(xml).map(|(tag, _)| tag).filter(|tag| appended(tag));
+        let mut arrays = tags.map(|tag| read_array(tag, data, count)).collect::<Result<Vec<_>, _>>()?;
+        let points = arrays.pop_if(|array| array.name == "Points").ok_or("no points")?;
+        Ok(Self { time, background, points: points.values.as_chunks().0.to_vec(), arrays })
     }
 }
 
@@ -274,32 +241,28 @@ fn attribute<'a>(tag: &'a str, name: &str) -> Option<&'a str> {
     None
 }
 
-/// An appended array of floats or indices; `None` for the cells, which hold no information.
-fn read_array(tag: &str, data: &[u8], count: usize) -> Result<Option<Array>, String> {
+/// An appended array of floats or indices.
+fn read_array(tag: &str, data: &[u8], count: usize) -> Result<Array, String> {
     let get = |name: &str| attribute(tag, name).ok_or(format!("an array without {name}"));
-    let (name, vtk_type) = (get("Name")?, get("type")?);
-    if !matches!(vtk_type, "Float64" | "UInt32") {
-        return Ok(None);
-    }
+    let name = get("Name")?;
     let number = |text: &str| text.parse::<usize>().map_err(|_| format!("{name}: {text:?} is no number"));
-    let (width, offset) = (number(attribute(tag, "NumberOfComponents").unwrap_or("1"))?, number(get("offset")?)?);
+    let width = number(attribute(tag, "NumberOfComponents").unwrap_or("1"))?;
+    let offset = number(get("offset")?)?;
     let bytes = data.get(offset..).and_then(inflated).ok_or(format!("{name}: damaged data"))?;
-    let values = match vtk_type {
-        "Float64" => Values::Float(bytes.as_chunks().0.iter().map(|&x| f64::from_le_bytes(x)).collect()),
-        _ => Values::Index(bytes.as_chunks().0.iter().map(|&x| u32::from_le_bytes(x)).collect()),
+    let is_index = get("type")? == "UInt32";
+    let values: Vec<f64> = if is_index {
+        bytes.as_chunks().0.iter().map(|&x| f64::from(u32::from_le_bytes(x))).collect()
+    } else {
+        bytes.as_chunks().0.iter().map(|&x| f64::from_le_bytes(x)).collect()
     };
-    let found = match &values {
-        Values::Float(values) => values.len(),
-        Values::Index(values) => values.len(),
-    };
-    if Some(found) != count.checked_mul(width) {
-        return Err(format!("{name}: {found} numbers for {count} points of {width} components"));
+    if Some(values.len()) != count.checked_mul(width) {
+        return Err(format!("{name}: {} numbers for {count} points of {width} components", values.len()));
     }
     let component = |k| attribute(tag, &format!("ComponentName{k}")).unwrap_or_default().to_owned();
-    Ok(Some(Array { name: name.to_owned(), components: (0..width).map(component).collect(), values }))
+    Ok(Array { name: name.to_owned(), components: (0..width).map(component).collect(), values, is_index })
 }
 
-/// Decompresses the data of [`Appended::push`].
+/// Decompresses the data of [`Parts::array`].
 fn inflated(data: &[u8]) -> Option<Vec<u8>> {
     let word = |k: usize| {
         let bytes = data.get(k.checked_mul(8)?..)?.first_chunk::<8>()?;
@@ -327,15 +290,16 @@ mod tests {
             name: name.to_owned(),
             components: components.iter().map(|&c| c.to_owned()).collect(),
             values,
+            is_index: name == "body",
         };
         Snapshot {
             time: 0.1 + 0.2,
             background: Background { dimension: 2, origin: [-0.5, 1e-9, 0.0], spacing: 0.1, cells: [20, 15, 0] },
             points: (0..count).map(|k| [x(k), x(k + 1), 0.0]).collect(),
             arrays: vec![
-                array("velocity", &["x", "y", "z"], Values::Float((0..3 * count).map(x).collect())),
-                array("jacobian", &[""], Values::Float((0..count).map(x).collect())),
-                array("body", &[""], Values::Index((0..count as u32).collect())),
+                array("velocity", &["x", "y", "z"], (0..3 * count).map(x).collect()),
+                array("jacobian", &[""], (0..count).map(x).collect()),
+                array("body", &[""], (0..count).map(|k| k as f64).collect()),
             ],
         }
     }
@@ -360,16 +324,18 @@ mod tests {
     /// header holds the block count, the block size, the size of a partial last block (0 if it is whole) and the compressed sizes.
     #[test]
     fn the_layout_is_that_of_vtk() -> Result<(), Box<dyn std::error::Error>> {
-        let mut appended = Appended::default();
-        appended.push(b"before");
+        let mut parts = Parts::default();
+        parts.array("UInt8", "before", &[""], b"before");
         let bytes: Vec<u8> = (0..2 * BLOCK + 5).map(|k| (k % 251) as u8).collect();
-        let offset = appended.push(&bytes);
+        let offset = parts.data.len();
+        parts.array("UInt8", "bytes", &[""], &bytes);
+        assert!(parts.xml.ends_with(&format!("Name=\"bytes\" format=\"appended\" offset=\"{offset}\"/>\n")));
         let words: Vec<u64> =
-            appended.0[offset..].as_chunks().0.iter().take(6).map(|&word| u64::from_le_bytes(word)).collect();
+            parts.data[offset..].as_chunks().0.iter().take(6).map(|&word| u64::from_le_bytes(word)).collect();
         assert_eq!(words[..3], [3, BLOCK as u64, 5]);
-        assert_eq!(words[3..].iter().sum::<u64>() as usize, appended.0.len() - offset - 6 * 8);
+        assert_eq!(words[3..].iter().sum::<u64>() as usize, parts.data.len() - offset - 6 * 8);
         let mut first = Vec::new();
-        ZlibDecoder::new(&appended.0[offset + 48..][..words[3] as usize]).read_to_end(&mut first)?;
+        ZlibDecoder::new(&parts.data[offset + 48..][..words[3] as usize]).read_to_end(&mut first)?;
         assert_eq!(first, bytes[..BLOCK]);
         Ok(())
     }

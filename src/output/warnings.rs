@@ -1,11 +1,11 @@
 //! Warnings during a run: each kind once, with time and value.
 
-use super::Reference;
-use super::contact::{Contact, Contacts};
+use super::contact::{self, Contact};
 use super::history::{Cost, Energies};
 use super::losses::{Cause, Losses};
-use super::path::{Event, Followed};
-use crate::simulation::{Sharing, Simulation};
+use super::path::{self, Event, Followed};
+use crate::simulation::{Settings, Sharing};
+use crate::solver::NewtonSettings;
 use serde::{Deserialize, Serialize};
 
 /// Created energy, as a fraction of the largest total energy so far, above which there is a warning.
@@ -77,7 +77,8 @@ pub(crate) struct Watch {
     losses: Losses,
     /// Consecutive steps after which the loss was too large.
     losing: u64,
-    contacts: Contacts,
+    /// Bodies that shared nodes.
+    pub(crate) contacts: Vec<Contact>,
     path: Followed,
     /// Whether the mass matrix is lumped in full.
     lumped: bool,
@@ -85,198 +86,169 @@ pub(crate) struct Watch {
     usual_krylov: f64,
     /// Steps seen.
     seen: u64,
-    warnings: Vec<Warning>,
+    /// All warnings so far.
+    pub(crate) warnings: Vec<Warning>,
 }
 
 /// The data of a step for the warnings.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Watched {
+pub(crate) struct Watched<'a> {
     pub time: f64,
     pub step: u64,
+    pub settings: &'a Settings,
     pub energies: Energies,
-    /// Whether there is inertia. In load steps, loads act at once and lose work.
-    pub has_inertia: bool,
     /// The event in the step that may lose energy.
     pub cause: Cause,
-    /// Whether the mass matrix is lumped in full.
-    pub lumped: bool,
     pub cost: Cost,
     /// Earlier attempts at the step that failed for another reason than their local error.
     pub failed: usize,
-    /// Local error and tolerance of the step; `None` without a tolerance.
-    pub error: Option<(f64, f64)>,
-    /// Newton iterations allowed.
-    pub newton_limit: usize,
+    /// Local error of the step; `None` without a tolerance.
+    pub error: Option<f64>,
     /// Linear systems left unsolved at the limit on iterations (`limited`), or because their residual no longer fell (`stagnated`). Failed
     /// attempts are included.
     pub limited: usize,
     pub stagnated: usize,
-    /// Krylov iterations allowed for a linear system.
-    pub krylov_limit: usize,
 }
 
 impl Watch {
-    /// All warnings so far.
-    pub(crate) fn warnings(&self) -> &[Warning] {
-        &self.warnings
-    }
-
-    /// Examines a step and returns the new warnings.
-    pub(crate) fn see(&mut self, step: &Watched) -> &[Warning] {
-        let known = self.warnings.len();
+    /// Examines a step.
+    pub(crate) fn see(&mut self, step: &Watched) {
         self.see_energy(step);
         self.see_step(step);
         self.see_solver(step);
-        &self.warnings[known..]
     }
 
     /// Warns of created or lost energy.
     fn see_energy(&mut self, step: &Watched) {
         self.losses.add(&step.energies, step.cause);
-        self.lumped = step.lumped;
-        let (part, balance) = (-self.losses.part(), step.energies.balance);
-        if step.has_inertia && part > CREATED {
-            self.warn(step, Kind::EnergyCreated, |_| {
-                let part = 100.0 * part;
-                format!(
-                    "energy was created: the balance is {balance:+.3e}, {part:.1} % of the largest total energy so far"
-                )
-            });
+        self.lumped = step.settings.lumping >= 1.0;
+        // In load steps, loads act at once and lose work.
+        let has_inertia = step.settings.scheme.has_inertia();
+        let (created, balance) = (-self.losses.part(), step.energies.balance);
+        if has_inertia && created > CREATED {
+            let part = 100.0 * created;
+            let text = format!(
+                "energy was created: the balance is {balance:+.3e}, {part:.1} % of the largest total energy so far"
+            );
+            self.warn(step, Kind::EnergyCreated, text);
         }
-        self.losing = if step.has_inertia && -part > LOST { self.losing + 1 } else { 0 };
+        self.losing = if has_inertia && -created > LOST { self.losing + 1 } else { 0 };
         // In the first steps from rest there is next to no energy.
         if self.losing >= USUAL_AFTER {
-            self.warn(step, Kind::EnergyLost, |watch| watch.losses.says(step.lumped));
+            self.warn(step, Kind::EnergyLost, self.losses.says(self.lumped));
         }
     }
 
     /// Warns of a step that was halved, or should have been.
     fn see_step(&mut self, step: &Watched) {
-        let Watched { cost, failed, error, .. } = *step;
+        let (dt, failed) = (step.cost.dt, step.failed);
         if failed > 0 {
-            let dt = cost.dt;
-            self.warn(step, Kind::StepHalved, |_| {
-                format!("the step had to be halved {failed} times, to dt = {dt:.3e}; report.json says why")
-            });
+            let text = format!("the step had to be halved {failed} times, to dt = {dt:.3e}; report.json says why");
+            self.warn(step, Kind::StepHalved, text);
         }
-        if let Some((error, tolerance)) = error.filter(|(error, tolerance)| error > tolerance) {
-            self.warn(step, Kind::StepInaccurate, |_| {
-                let dt = cost.dt;
-                format!("a step of dt = {dt:.3e} errs by {error:.2e} grid spacings, {tolerance:.2e} are allowed, and time.max_halvings is reached")
-            });
+        if let Some((error, tolerance)) = step.error.zip(step.settings.error_tolerance)
+            && error > tolerance
+        {
+            let text = format!(
+                "a step of dt = {dt:.3e} errs by {error:.2e} grid spacings, {tolerance:.2e} are allowed, and time.max_halvings is reached"
+            );
+            self.warn(step, Kind::StepInaccurate, text);
         }
     }
 
     /// Warns of many iterations of Newton's method, and of linear systems that are hard to solve.
     fn see_solver(&mut self, step: &Watched) {
-        let Watched { cost, newton_limit, limited, stagnated, krylov_limit, .. } = *step;
-        if 2 * cost.newton > newton_limit && newton_limit > 1 {
-            self.warn(step, Kind::NewtonClimbs, |_| {
-                format!(
-                    "Newton's method took {} of {newton_limit} allowed iterations, where a few are usual: shorten time.step, or raise \
-                     solver.newton.max_iterations",
-                    cost.newton
-                )
-            });
+        let Watched { cost, limited, stagnated, .. } = *step;
+        let NewtonSettings { max_iterations, max_krylov_iterations, .. } = step.settings.newton;
+        if 2 * cost.newton > max_iterations && max_iterations > 1 {
+            let text = format!(
+                "Newton's method took {} of {max_iterations} allowed iterations, where a few are usual: shorten time.step, or raise \
+                 solver.newton.max_iterations",
+                cost.newton
+            );
+            self.warn(step, Kind::NewtonClimbs, text);
         }
         let (krylov, usual) = (cost.krylov as f64, self.usual_krylov);
         if self.seen >= USUAL_AFTER && krylov > KRYLOV_GROWTH * usual && krylov > FEW_KRYLOV_ITERATIONS {
-            self.warn(step, Kind::KrylovClimbs, |_| {
-                format!(
-                    "the linear solver took {krylov} iterations in a step; {usual:.0} had been usual: cut cells are cured by \
-                     aggregation = true, long steps and fine grids by solver.krylov.preconditioner = \"multigrid\""
-                )
-            });
+            let text = format!(
+                "the linear solver took {krylov} iterations in a step; {usual:.0} had been usual: cut cells are cured by \
+                 aggregation = true, long steps and fine grids by solver.krylov.preconditioner = \"multigrid\""
+            );
+            self.warn(step, Kind::KrylovClimbs, text);
         }
         if limited > 0 {
-            self.warn(step, Kind::KrylovLimited, |_| {
-                format!(
-                    "{limited} linear systems of a step were left unsolved after the {krylov_limit} iterations allowed: they are badly \
-                     conditioned; raise solver.krylov.max_iterations, shorten time.step, or set aggregation = true for cut cells"
-                )
-            });
+            let text = format!(
+                "{limited} linear systems of a step were left unsolved after the {max_krylov_iterations} iterations allowed: they are badly \
+                 conditioned; raise solver.krylov.max_iterations, shorten time.step, or set aggregation = true for cut cells"
+            );
+            self.warn(step, Kind::KrylovLimited, text);
         }
         if stagnated > 0 {
-            self.warn(step, Kind::KrylovStagnated, |_| {
-                format!(
-                    "{stagnated} linear systems of a step were left unsolved because their residual no longer fell: they are nearly \
-                     singular, or GMRES restarts too early; hold bodies that can move freely, or raise solver.krylov.method.gmres.restart"
-                )
-            });
+            let text = format!(
+                "{stagnated} linear systems of a step were left unsolved because their residual no longer fell: they are nearly \
+                 singular, or GMRES restarts too early; hold bodies that can move freely, or raise solver.krylov.method.gmres.restart"
+            );
+            self.warn(step, Kind::KrylovStagnated, text);
         }
         self.seen += 1;
         self.usual_krylov += (krylov - usual) / self.seen.min(MEMORY) as f64;
     }
 
-    /// Examines the bodies that share nodes after a step. Returns a warning for each pair of bodies that sticks together from now on.
-    pub(crate) fn see_contact(&mut self, step: &Watched, sharing: &[Sharing], names: &[&str]) -> &[Warning] {
-        let known = self.warnings.len();
-        let Watched { time, cost, step: number, .. } = *step;
-        for message in self.contacts.see(time, cost.dt, number == 1, sharing, names) {
-            self.warnings.push(Warning { kind: Kind::BodiesStick, time, step: number, message });
-        }
-        &self.warnings[known..]
+    /// Examines the bodies that share nodes after a step. Warns of each pair of bodies that sticks together from now on.
+    pub(crate) fn see_contact(&mut self, step: &Watched, sharing: &[Sharing], names: &[&str]) {
+        let Watched { time, cost, step, .. } = *step;
+        let said = contact::see(&mut self.contacts, time, cost.dt, step == 1, sharing, names);
+        let warning = |message| Warning { kind: Kind::BodiesStick, time, step, message };
+        self.warnings.extend(said.into_iter().map(warning));
     }
 
-    /// Examines a step along the equilibrium path. `straight` is the cosine of the angle between the displacements of this step and the
-    /// previous step.
-    pub(crate) fn see_path<const D: usize, L, A>(
-        &mut self,
-        step: &Watched,
-        simulation: &Simulation<D, L, A>,
-        reference: &Reference<D>,
-        straight: Option<f64>,
-    ) -> &[Warning] {
-        let known = self.warnings.len();
-        for event in self.path.see(simulation, reference, straight) {
-            match event {
-                Event::Turned(load) => self.warn(step, Kind::PathTurned, |_| {
+    /// Warns of events in a step along the equilibrium path, to `point`. `straight` is the cosine of the angle between the displacements of
+    /// this step and the previous step.
+    pub(crate) fn see_path(&mut self, step: &Watched, point: path::Point, straight: Option<f64>) {
+        for event in self.path.add(point, straight) {
+            let (kind, text) = match event {
+                Event::Turned(load) => (
+                    Kind::PathTurned,
                     format!(
                         "the load turns at {load:.6e}, a limit point: the stiffness along the path changes its sign there, and under a load \
                          that is kept, bodies are unstable until it turns again"
-                    )
-                }),
-                Event::Bent(angle) => self.warn(step, Kind::PathBent, |_| {
+                    ),
+                ),
+                Event::Bent(angle) => (
+                    Kind::PathBent,
                     format!(
                         "the path of equilibria bends by {angle:.0} degrees from one step to the next: it may have gone to another branch; \
                          shorten time.step and compare"
-                    )
-                }),
-                Event::Returned(load) => self.warn(step, Kind::PathReturned, |_| {
+                    ),
+                ),
+                Event::Returned(load) => (
+                    Kind::PathReturned,
                     format!(
                         "the path of equilibria goes back the way that it came, and is at the load {load:.6e} again: what follows is \
                          nothing new; shorten time.step, or give the body a small imperfection where it may buckle"
-                    )
-                }),
-            }
+                    ),
+                ),
+            };
+            self.warn(step, kind, text);
         }
-        &self.warnings[known..]
     }
 
-    /// Bodies that shared nodes.
-    pub(crate) fn contacts(&self) -> &[Contact] {
-        self.contacts.all()
-    }
-
-    /// Ends the run after step `number`, which ended at `time`. A loss of energy is reported again with its final size. Returns the new
-    /// warning.
-    pub(crate) fn end(&mut self, time: f64, number: u64) -> Option<&Warning> {
-        let mut told =
-            self.warnings.iter().filter(|warning| warning.kind == Kind::EnergyLost).map(|warning| warning.time);
-        let first = told.next()?;
-        if self.losing == 0 || told.next().unwrap_or(first) == time {
-            return None;
+    /// Ends the run after step `number`, which ended at `time`. A loss of energy is reported again with its final size.
+    pub(crate) fn end(&mut self, time: f64, step: u64) {
+        let kind = Kind::EnergyLost;
+        let mut told = self.warnings.iter().filter(|warning| warning.kind == kind).map(|warning| warning.time);
+        let Some(first) = told.next() else { return };
+        if self.losing > 0 && told.next_back().unwrap_or(first) != time {
+            let said = self.losses.says(self.lumped);
+            let message = format!("{said}; more than {} % since t = {first}", 100.0 * LOST);
+            self.warnings.push(Warning { kind, time, step, message });
         }
-        let since = format!("more than {} % since t = {first}", 100.0 * LOST);
-        let message = format!("{}; {since}", self.losses.says(self.lumped));
-        self.warnings.push(Warning { kind: Kind::EnergyLost, time, step: number, message });
-        self.warnings.last()
     }
 
-    fn warn(&mut self, step: &Watched, kind: Kind, message: impl FnOnce(&Self) -> String) {
+    /// Adds a warning, if it is the first of its kind.
+    fn warn(&mut self, step: &Watched, kind: Kind, message: String) {
         if self.warnings.iter().all(|warning| warning.kind != kind) {
             let Watched { time, step, .. } = *step;
-            let message = message(self);
             self.warnings.push(Warning { kind, time, step, message });
         }
     }
@@ -285,8 +257,15 @@ impl Watch {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mechanics::schemes::Statics;
+    use std::sync::{Arc, LazyLock};
 
-    fn step(number: u64) -> Watched {
+    fn step(number: u64) -> Watched<'static> {
+        static SETTINGS: LazyLock<Settings> = LazyLock::new(|| Settings {
+            error_tolerance: Some(1e-3),
+            newton: NewtonSettings { max_iterations: 30, max_krylov_iterations: 2000, ..NewtonSettings::default() },
+            ..Settings::default()
+        });
         let energies = Energies {
             kinetic: 2.0,
             strain: 2.0,
@@ -301,72 +280,100 @@ mod tests {
         Watched {
             time: 0.1 * number as f64,
             step: number,
+            settings: &SETTINGS,
             energies,
-            has_inertia: true,
             cause: Cause::Wall,
-            lumped: true,
             cost,
             failed: 0,
             error: None,
-            newton_limit: 30,
             limited: 0,
             stagnated: 0,
-            krylov_limit: 2000,
         }
+    }
+
+    /// Examines a step and returns the new warnings.
+    fn told<'a>(watch: &'a mut Watch, step: &Watched) -> &'a [Warning] {
+        let known = watch.warnings.len();
+        watch.see(step);
+        &watch.warnings[known..]
+    }
+
+    /// Ends the run and returns the new warning.
+    fn last(watch: &mut Watch, time: f64, number: u64) -> Option<Warning> {
+        let known = watch.warnings.len();
+        watch.end(time, number);
+        watch.warnings.get(known).cloned()
     }
 
     #[test]
     fn each_kind_is_told_once_with_time_and_value() {
         let mut watch = Watch::default();
         for number in 1..=20 {
-            assert!(watch.see(&step(number)).is_empty(), "{number}");
+            assert!(told(&mut watch, &step(number)).is_empty(), "{number}");
         }
         let balance = |x: f64| Watched { energies: Energies { balance: x, ..step(0).energies }, ..step(21) };
-        assert!(watch.see(&balance(0.039)).is_empty(), "1 % of 4 is not reached");
-        let [warning] = watch.see(&balance(0.08)) else { panic!("one") };
+        assert!(told(&mut watch, &balance(0.039)).is_empty(), "1 % of 4 is not reached");
+        let [warning] = told(&mut watch, &balance(0.08)) else { panic!("one") };
         assert_eq!((warning.kind, warning.step, warning.time), (Kind::EnergyCreated, 21, 2.1));
         assert!(warning.message.contains("+8.000e-2, 2.0 %"), "{}", warning.message);
-        assert!(watch.see(&balance(3.0)).is_empty(), "once");
-        assert!(watch.see(&balance(-0.079)).is_empty(), "2 % of 4 are not reached: work does not count");
-        assert!(watch.see(&Watched { has_inertia: false, ..balance(-0.1) }).is_empty(), "without inertia");
+        assert!(told(&mut watch, &balance(3.0)).is_empty(), "once");
+        assert!(told(&mut watch, &balance(-0.079)).is_empty(), "2 % of 4 are not reached: work does not count");
+        let statics = Settings { scheme: Arc::new(Statics), ..Settings::default() };
+        assert!(told(&mut watch, &Watched { settings: &statics, ..balance(-0.1) }).is_empty(), "without inertia");
         let words = [
             "1.000e-1, 2.5 % of the largest total energy 4.000e0",
             "a body meets a wall (impact)",
             "shorten time.step",
         ];
         for step in 1..USUAL_AFTER {
-            assert!(watch.see(&balance(-0.1)).is_empty(), "{step} steps may be a start from rest");
+            assert!(told(&mut watch, &balance(-0.1)).is_empty(), "{step} steps may be a start from rest");
         }
         assert!(
-            watch.see(&balance(-0.1)).iter().any(|warning| words.iter().all(|word| warning.message.contains(word)))
+            told(&mut watch, &balance(-0.1))
+                .iter()
+                .any(|warning| words.iter().all(|word| warning.message.contains(word)))
         );
         let halved = Watched { failed: 2, ..step(22) };
-        assert!(watch.see(&halved).iter().any(|warning| warning.message.contains("halved 2 times, to dt = 1.000e-1")));
-        let inaccurate = Watched { error: Some((2e-3, 1e-3)), ..step(22) };
-        assert!(watch.see(&Watched { error: Some((1e-3, 1e-3)), ..step(22) }).is_empty());
-        assert!(watch.see(&inaccurate).iter().any(|warning| warning.message.contains("errs by 2.00e-3 grid spacings")));
+        assert!(
+            told(&mut watch, &halved)
+                .iter()
+                .any(|warning| warning.message.contains("halved 2 times, to dt = 1.000e-1"))
+        );
+        let inaccurate = Watched { error: Some(2e-3), ..step(22) };
+        assert!(told(&mut watch, &Watched { error: Some(1e-3), ..step(22) }).is_empty());
+        assert!(
+            told(&mut watch, &inaccurate)
+                .iter()
+                .any(|warning| warning.message.contains("errs by 2.00e-3 grid spacings"))
+        );
         let newton = Watched { cost: Cost { newton: 16, ..step(0).cost }, ..step(23) };
         let words = ["16 of 30", "shorten time.step"];
-        assert!(watch.see(&newton).iter().any(|warning| words.iter().all(|word| warning.message.contains(word))));
+        assert!(
+            told(&mut watch, &newton).iter().any(|warning| words.iter().all(|word| warning.message.contains(word)))
+        );
         let krylov = |krylov| Watched { cost: Cost { krylov, ..step(0).cost }, ..step(24) };
-        assert!(watch.see(&krylov(150)).is_empty(), "five times is not more than five times");
+        assert!(told(&mut watch, &krylov(150)).is_empty(), "five times is not more than five times");
         // the mean: 39 steps of 30 iterations, and the step of 150
         let words = ["180 iterations in a step; 33", "aggregation", "multigrid"];
-        assert!(watch.see(&krylov(180)).iter().any(|warning| words.iter().all(|word| warning.message.contains(word))));
+        assert!(
+            told(&mut watch, &krylov(180))
+                .iter()
+                .any(|warning| words.iter().all(|word| warning.message.contains(word)))
+        );
         let limited = Watched { limited: 2, ..step(25) };
-        assert!(watch.see(&limited).iter().any(
+        assert!(told(&mut watch, &limited).iter().any(
             |warning| warning.message.starts_with("2 linear systems") && warning.message.contains("the 2000 iter")
         ));
         let stagnated = Watched { stagnated: 3, ..step(26) };
-        assert!(watch.see(&stagnated).iter().any(|warning| warning.message.starts_with("3 linear systems")));
-        assert!(watch.see(&stagnated).is_empty() && watch.see(&limited).is_empty(), "once");
-        assert_eq!(watch.warnings().len(), 8);
+        assert!(told(&mut watch, &stagnated).iter().any(|warning| warning.message.starts_with("3 linear systems")));
+        assert!(told(&mut watch, &stagnated).is_empty() && told(&mut watch, &limited).is_empty(), "once");
+        assert_eq!(watch.warnings.len(), 8);
         // At the end the loss is reported with its final size.
-        watch.see(&balance(-0.2));
-        let told = watch.end(3.0, 30).map(|warning| (warning.kind, warning.time, warning.message.clone()));
-        let Some((Kind::EnergyLost, 3.0, message)) = told else { panic!("{told:?}") };
+        told(&mut watch, &balance(-0.2));
+        let end = last(&mut watch, 3.0, 30).map(|warning| (warning.kind, warning.time, warning.message));
+        let Some((Kind::EnergyLost, 3.0, message)) = end else { panic!("{end:?}") };
         assert!(message.contains("2.000e-1, 5.0 %") && message.ends_with("more than 2 % since t = 2.1"), "{message}");
-        assert_eq!(watch.end(3.0, 30), None, "once");
+        assert_eq!(last(&mut watch, 3.0, 30), None, "once");
         // the state of the watch survives a checkpoint
         let text = serde_json::to_string(&watch).unwrap();
         assert_eq!(serde_json::from_str::<Watch>(&text).unwrap(), watch);
@@ -376,37 +383,29 @@ mod tests {
     fn a_loss_is_told_with_where_it_was_lost_and_not_in_the_first_steps() {
         let lost = |x: f64, cause| Watched { energies: Energies { balance: -x, ..step(0).energies }, cause, ..step(1) };
         let mut watch = Watch::default();
-        assert!(watch.see(&lost(0.3, Cause::Bodies)).is_empty());
+        assert!(told(&mut watch, &lost(0.3, Cause::Bodies)).is_empty());
         for _ in 2..USUAL_AFTER {
-            assert!(watch.see(&lost(0.4, Cause::NewGrid)).is_empty());
-            assert_eq!(watch.end(0.2, 2), None, "a start from rest has next to no energy");
+            assert!(told(&mut watch, &lost(0.4, Cause::NewGrid)).is_empty());
+            assert_eq!(last(&mut watch, 0.2, 2), None, "a start from rest has next to no energy");
         }
-        let told = watch.see(&lost(0.4, Cause::NewGrid)).first().map(|warning| (warning.kind, warning.message.clone()));
-        let Some((Kind::EnergyLost, message)) = told else { panic!("{told:?}") };
+        let [warning] = told(&mut watch, &lost(0.4, Cause::NewGrid)) else { panic!("one") };
+        let Warning { kind: Kind::EnergyLost, message, .. } = warning else { panic!("{warning:?}") };
         assert!(
             message.contains("75 % of it in steps in which bodies share nodes")
                 && message.contains("25 % of it in other"),
             "{message}"
         );
         let mut watch = Watch::default();
-        watch.see(&lost(0.07, Cause::Step));
-        assert_eq!(watch.end(0.1, 1), None, "less than 2 %");
+        told(&mut watch, &lost(0.07, Cause::Step));
+        assert_eq!(last(&mut watch, 0.1, 1), None, "less than 2 %");
     }
 
     #[test]
     fn numbers_that_are_none_leave_it_able_to_be_saved() {
         let mut watch = Watch::default();
-        let nan = Energies {
-            kinetic: f64::NAN,
-            strain: f64::INFINITY,
-            external: 0.0,
-            dissipated: 0.0,
-            by_laws: 0.0,
-            initial: 0.0,
-            total: f64::NAN,
-            balance: f64::NAN,
-        };
-        watch.see(&Watched { energies: nan, ..step(1) });
+        let [kinetic, strain, total, balance] = [f64::NAN, f64::INFINITY, f64::NAN, f64::NAN];
+        let nan = Energies { kinetic, strain, total, balance, ..Energies::default() };
+        told(&mut watch, &Watched { energies: nan, ..step(1) });
         let text = serde_json::to_string(&watch).unwrap();
         assert_eq!(serde_json::from_str::<Watch>(&text).unwrap(), watch);
     }

@@ -2,7 +2,7 @@
 
 use super::scene_arguments::SceneArguments;
 use super::{Failure, print};
-use bfree::output::plot::{self, PlotError};
+use bfree::output::plot;
 use bfree::scene::{Scene, time::MAX_STEPS};
 use bfree::simulation::{Simulation, StepReport};
 use bfree::solver::{Forcing, NewtonIteration};
@@ -168,7 +168,7 @@ impl Newton {
         let lines: Vec<_> = solutions.iter().map(|one| (one.name.as_str(), one.norms.as_slice())).collect();
         let svg = plot::newton_norms("Convergence of Newton's method", &lines);
         let content = match path.extension().is_some_and(|extension| extension == "png") {
-            true => plot::png::from_svg("the norms", &svg).map_err(|error: PlotError| Failure::run(error))?,
+            true => plot::png::from_svg("the norms", &svg).map_err(Failure::run)?,
             false => svg.into_bytes(),
         };
         write(path, &content)

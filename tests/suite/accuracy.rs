@@ -1,11 +1,11 @@
 //! The key `accuracy`: the values it sets, the values it leaves, and the values it refuses.
 
-use crate::support::Failure;
+use crate::support::{self, Failure, said};
 use bfree::scene::accuracy::levels;
 use bfree::scene::{self, Scene};
 use serde_json::{Value, json};
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Command;
 
 /// A block of 1 × 0.5 on a floor, without any setting; c = √(12/3) = 2.
 fn open_scene() -> Value {
@@ -26,14 +26,7 @@ fn read(scene: &Value) -> Result<Scene, Failure> {
 }
 
 fn with(changes: &[(&str, Value)]) -> Value {
-    let mut scene = open_scene();
-    for (pointer, value) in changes {
-        let (parent, key) = pointer.rsplit_once('/').unwrap_or(("", pointer));
-        if let Some(parent) = scene.pointer_mut(parent) {
-            parent[key] = value.clone();
-        }
-    }
-    scene
+    support::with(open_scene(), changes)
 }
 
 #[test]
@@ -51,10 +44,8 @@ fn each_word_sets_what_its_row_of_the_table_says() -> Result<(), Failure> {
         let written = serde_json::to_value(&scene)?;
         let open = ["grid.spacing=0.5".parse()?, "time.step=1".parse()?];
         let default = serde_json::to_value(scene::read(&open_scene().to_string(), &open)?)?;
-        match level.lumping {
-            Some(lumping) => assert_eq!(written["time"]["lumping"], lumping),
-            None => assert_eq!(written["time"]["lumping"], default["time"]["lumping"]),
-        }
+        let lumping = level.lumping.map_or_else(|| default["time"]["lumping"].clone(), Value::from);
+        assert_eq!(written["time"]["lumping"], lumping);
         match level.gamma {
             Some(gamma) => assert_eq!(written["approximation"]["lme"]["gamma"], gamma),
             None => assert_eq!(written["approximation"], default["approximation"]),
@@ -121,22 +112,17 @@ fn it_yields_to_every_key_that_is_given() -> Result<(), Failure> {
 #[test]
 fn what_it_cannot_choose_is_told() -> Result<(), Failure> {
     let draft = || ("/accuracy", Value::from("draft"));
-    let steel = json!({ "neo_hookean": { "young": -1, "poisson": 0.3 } });
+    let steel = ("/bodies/0/material", json!({ "neo_hookean": { "young": -1, "poisson": 0.3 } }));
     let from_file = json!([{ "name": "cloud", "particles": { "file": "cloud.csv" }, "density": 1,
         "material": { "neo_hookean": { "lambda": 4, "shear": 4 } } }]);
+    let odd = ("/grid/size", json!([2, std::f64::consts::SQRT_2]));
     let cases: [(Value, &[&str]); 8] = [
         (with(&[("/accuracy", "fine".into())]), &["accuracy", "unknown variant `fine`", "`draft`"]),
         (with(&[("/accuracy", json!({ "error": 7 }))]), &["accuracy.error", "7 is not allowed", "between"]),
         (with(&[("/accuracy", json!({ "error": -0.01 }))]), &["accuracy.error", "-0.01 is not allowed"]),
-        (
-            with(&[draft(), ("/grid/size", json!([2, std::f64::consts::SQRT_2]))]),
-            &["accuracy", "divides every edge", "give grid.spacing"],
-        ),
+        (with(&[draft(), odd]), &["accuracy", "divides every edge", "give grid.spacing"]),
         (with(&[draft(), ("/bodies", from_file)]), &["accuracy", "\"cloud\"", "file", "give grid.spacing"]),
-        (
-            with(&[draft(), ("/bodies/0/material", steel)]),
-            &["accuracy", "\"block\"", "speed of sound", "give time.step"],
-        ),
+        (with(&[draft(), steel]), &["accuracy", "\"block\"", "speed of sound", "give time.step"]),
         (with(&[draft(), ("/bodies/0/shape/box/max", json!([0.1, 0.5]))]), &["accuracy", "\"block\" has no extent"]),
         (open_scene(), &["missing field `spacing`"]),
     ];
@@ -160,8 +146,11 @@ fn without_inertia_it_sets_nothing_that_needs_it() -> Result<(), Failure> {
     Ok(())
 }
 
-fn program(arguments: &[&str], folder: &Path) -> Result<Output, Failure> {
-    Ok(Command::new(env!("CARGO_BIN_EXE_bfree")).args(arguments).current_dir(folder).output()?)
+/// Runs the program in a folder. Returns its exit code and what it said.
+fn program(arguments: &[&str], folder: &Path) -> Result<(Option<i32>, String), Failure> {
+    let mut program = Command::new(env!("CARGO_BIN_EXE_bfree"));
+    let (code, out, err) = said(program.args(arguments).current_dir(folder))?;
+    Ok((code, out + &err))
 }
 
 #[test]
@@ -169,15 +158,11 @@ fn check_run_and_report_show_it_and_a_restart_holds_it() -> Result<(), Failure> 
     let folder = tempfile::tempdir()?;
     let scene = with(&[("/accuracy", "draft".into()), ("/output", json!({ "checkpoint": 0.1 }))]);
     std::fs::write(folder.path().join("block.json"), scene.to_string())?;
-    let said = |output: &Output| {
-        let text = [&output.stdout[..], &output.stderr].concat();
-        String::from_utf8_lossy(&text).into_owned()
-    };
-    let check = said(&program(&["check", "block.json"], folder.path())?);
-    assert!(check.contains("\"draft\" sets ") && check.contains("grid.spacing = 0."), "{check}");
-    let run = program(&["run", "block.json", "--steps", "2", "--out", "out", "--plot"], folder.path())?;
-    assert!(run.status.success(), "{}", said(&run));
-    assert!(said(&run).contains("accuracy \"draft\" sets ") && said(&run).contains("time.step = 0."), "{}", said(&run));
+    let (_, text) = program(&["check", "block.json"], folder.path())?;
+    assert!(text.contains("\"draft\" sets ") && text.contains("grid.spacing = 0."), "{text}");
+    let (code, text) = program(&["run", "block.json", "--steps", "2", "--out", "out", "--plot"], folder.path())?;
+    assert_eq!(code, Some(0), "{text}");
+    assert!(text.contains("accuracy \"draft\" sets ") && text.contains("time.step = 0."), "{text}");
     let report: Value = serde_json::from_slice(&std::fs::read(folder.path().join("out/report.json"))?)?;
     assert_eq!((&report["accuracy"]["asked"], &report["settings"]["accuracy"]), (&json!("draft"), &json!("draft")));
     let keys: Vec<_> = report["accuracy"]["sets"].as_array().into_iter().flatten().map(|set| &set["key"]).collect();
@@ -185,10 +170,9 @@ fn check_run_and_report_show_it_and_a_restart_holds_it() -> Result<(), Failure> 
     assert!(std::fs::read_to_string(folder.path().join("out/report.html"))?.contains("What the accuracy has set"));
 
     let other = ["run", "block.json", "--out", "out", "--restart", "--set", "accuracy=standard"];
-    let refused = program(&other, folder.path())?;
-    assert_eq!(refused.status.code(), Some(2), "{}", said(&refused));
-    assert!(said(&refused).contains("accuracy was \"draft\" and is \"standard\""), "{}", said(&refused));
-    let same = program(&["run", "block.json", "--out", "out", "--restart", "--steps", "4"], folder.path())?;
-    assert!(same.status.success(), "{}", said(&same));
+    let (code, text) = program(&other, folder.path())?;
+    assert!(code == Some(2) && text.contains("accuracy was \"draft\" and is \"standard\""), "{text}");
+    let (code, text) = program(&["run", "block.json", "--out", "out", "--restart", "--steps", "4"], folder.path())?;
+    assert_eq!(code, Some(0), "{text}");
     Ok(())
 }

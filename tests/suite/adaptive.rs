@@ -1,14 +1,10 @@
 //! Steps whose length follows an error tolerance.
 
+use crate::damping;
 use crate::support::{Failure, scene};
-use bfree::approximation::{Approximation, Bspline};
 use bfree::clock::Clock;
-use bfree::grid::Grid;
-use bfree::material::{Lame, Material, NeoHookean};
-use bfree::mechanics::loads::{Loads, Motion, Prescribed, Selection};
-use bfree::particles::{Body, Particles};
+use bfree::mechanics::loads::Rayleigh;
 use bfree::simulation::{Settings, Simulation};
-use bfree::tensor::Vector;
 use std::f64::consts::PI;
 
 /// A bar of length 1 and wave speed 1 between two walls. It starts undeformed, with the speed V sin πx. For tiny V it vibrates with u =
@@ -16,34 +12,14 @@ use std::f64::consts::PI;
 const SPEED: f64 = 1e-6;
 
 fn bar(dt: f64) -> Result<Simulation<1>, Failure> {
-    let cells = 64;
-    let h = 1.0 / f64::from(cells);
-    let mut particles = Particles::<1>::default();
-    for p in 0..2 * cells {
-        let x = (f64::from(p) + 0.5) * 0.5 * h;
-        particles.push(Vector::from([x]), Vector::from([SPEED * (PI * x).sin()]), 0.5 * h, 0.5 * h, 0);
-    }
-    let wall = |upper| Prescribed {
-        name: "wall".into(),
-        on: Selection::Face { axis: 0, upper },
-        motion: [Some(Motion::Rest)],
-    };
-    let grid = Grid { origin: Vector::zeros(), spacing: h, cells: [cells] };
-    let bodies = vec![Body {
-        name: "bar".into(),
-        law: Material::from(NeoHookean::ciarlet(Lame::new(0.5, 0.25)?)),
-        density: 1.0,
-        dilatation: Default::default(),
-    }];
-    Ok(Simulation {
-        loads: Loads { prescribed: vec![wall(false), wall(true)], ..Loads::default() },
-        settings: Settings { lumping: 0.0, error_tolerance: Some(1.0), ..Settings::default() },
-        ..Simulation::new(grid, Approximation::from(Bspline::Quadratic), bodies, particles, Clock::new(dt, 10))
-    })
+    let mut simulation = damping::bar(64, dt, Rayleigh { mass: 0.0, stiffness: 0.0 }, SPEED, false)?;
+    simulation.loads.damping = None;
+    simulation.clock = Clock::new(dt, 10);
+    simulation.settings = Settings { lumping: 0.0, error_tolerance: Some(1.0), ..Settings::default() };
+    Ok(simulation)
 }
 
-/// In one step the trapezoidal rule has the error Δt³ u‴/12, in the mean square with u‴ = V ω² cos(ωt) √½. The estimate must equal this
-/// error, and is of third order.
+/// The error of the trapezoidal rule in one step is Δt³ u‴/12, in the mean square with u‴ = V ω² cos(ωt) √½.
 #[test]
 fn the_estimate_is_the_local_error_of_an_oscillation() -> Result<(), Failure> {
     let mut last = None;
@@ -131,13 +107,9 @@ fn an_impact_takes_fewer_steps_than_short_ones_all_the_way() -> Result<(), Failu
     let (uniform, all) = run(&["time.step=0.025"])?;
     let adaptive = ["time.step=0.8", r#"time.adaptive={"tolerance":1e-5}"#];
     let (one, few) = run(&adaptive)?;
-    println!("uniform {all} {:e}, adaptive {few} {:e}", distance(&uniform, &exact), distance(&one, &exact));
-    assert!(
-        distance(&one, &exact) <= distance(&uniform, &exact),
-        "{} {}",
-        distance(&one, &exact),
-        distance(&uniform, &exact)
-    );
+    let [error, of_uniform] = [&one, &uniform].map(|run| distance(run, &exact));
+    println!("uniform {all} {of_uniform:e}, adaptive {few} {error:e}");
+    assert!(error <= of_uniform, "{error} {of_uniform}");
     assert!(3 * few < 2 * all, "{few} attempts, {all} steps");
     // A second run gives the same bits.
     let (again, same) = run(&adaptive)?;

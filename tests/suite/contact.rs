@@ -1,6 +1,6 @@
 //! The distance between the surfaces of two bodies when contact begins: the table of `docs/src/limits.md`, measured.
 
-use crate::support::{Failure, built, restored};
+use crate::support::{Failure, built, restored, solid};
 use bfree::scene;
 use bfree::simulation::Simulation;
 use serde_json::json;
@@ -57,15 +57,12 @@ fn bodies_touch_as_far_apart_as_the_manual_says() -> Result<(), Failure> {
 /// later.
 #[test]
 fn a_restart_knows_which_bodies_are_bonded() -> Result<(), Failure> {
-    let block = |name: &str, low: f64| {
-        json!({ "name": name, "shape": { "box": { "min": [0.5, low], "max": [1.25, low + 0.5] } }, "density": 1,
-                "material": { "neo_hookean": { "young": 1000, "poisson": 0.3 } } })
-    };
+    let shape = |low: f64| json!({ "box": { "min": [0.5, low], "max": [1.25, low + 0.5] } });
     let scene = json!({
         "grid": { "size": [2, 1.5], "spacing": 0.25 },
         "approximation": "linear",
         "time": { "step": 0.25, "end": 1, "scheme": "none" },
-        "bodies": [block("lower", 0.0), block("upper", 0.5)],
+        "bodies": [solid("lower", 1000, shape(0.0)), solid("upper", 1000, shape(0.5))],
         "boundary": { "bottom": "fixed" },
         "gravity": { "acceleration": [0, -20], "curve": [[0, 0], [1, 1]] }
     });

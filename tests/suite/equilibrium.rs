@@ -1,7 +1,6 @@
-//! The equilibrium of one step, used directly: does its own check detect a wrong tangent, and which round-off bounds (magnitudes) does it
-//! give?
+//! The equilibrium of one step, used directly: its own check of the tangent, and its round-off bounds (magnitudes).
 
-use crate::support::Failure;
+use crate::support::{Failure, body, irregular};
 use bfree::approximation::{Approximation, Linear};
 use bfree::grid::Grid;
 use bfree::material::{ClosedTangent, Lame, Law, MaterialState, NeoHookean};
@@ -93,11 +92,6 @@ impl Law for Faulty {
     }
 }
 
-/// Numbers without pattern in (−1, 1).
-fn irregular(k: usize) -> f64 {
-    2.0 * ((k + 1) as f64 * 0.618_033_988_749_894_9).fract() - 1.0
-}
-
 /// Deformed particles of two bodies on a small grid; the second body begins at particle `SECOND`.
 struct Cloud<const D: usize> {
     particles: Particles<D>,
@@ -112,12 +106,7 @@ const SECOND: usize = 7;
 /// A cloud whose second body has a wrong law.
 fn cloud<const D: usize>(stress: f64, fault: Fault, closed: bool) -> Result<Cloud<D>, Failure> {
     let law = NeoHookean::ciarlet(Lame::new(1.5 * stress, stress)?);
-    let body = |fault| Body {
-        name: "part".into(),
-        law: Faulty { law, fault, closed },
-        density: 1.0,
-        dilatation: Default::default(),
-    };
+    let body = |fault| body(Faulty { law, fault, closed });
     let mut particles = Particles::default();
     for p in 0..12 {
         let number = |k: usize| irregular(31 * p + k);
@@ -201,8 +190,7 @@ fn wrong_pieces<const D: usize>(
 }
 
 fn a_wrong_law_is_found<const D: usize>(stress: f64) -> Result<(), Failure> {
-    // The fault in the law of the second body, whether the law has a closed form, and the pieces that are wrong. The check reports the
-    // first wrong piece.
+    // The fault in the law of the second body, whether the law has a closed form, and the wrong pieces. The check names the first.
     let both: &[&str] = &["stress", "material"];
     for (fault, closed, wrong) in [
         (Fault::Nothing, true, &[][..]),

@@ -1,6 +1,6 @@
 //! Laws with plastic or viscous flow: closed forms at a point, and whole bodies that yield.
 
-use crate::support::{Failure, Random, output, restored, scene};
+use crate::support::{Failure, Random, advance, cases, in_threads, output, restored, scene};
 use bfree::field::Field;
 use bfree::material::{
     Branch, Cone, DISSIPATED, DruckerPrager, Hardening, Lame, Law, Material, MaterialState, NeoHookean, PLASTIC_STRAIN,
@@ -71,8 +71,7 @@ fn uniaxial_yield_and_reversal_have_a_closed_form() -> Result<(), Failure> {
     Ok(())
 }
 
-/// Proportional stretching at constant volume, in one step or in many: radial return is exact, and the stress satisfies Voce's hardening at
-/// its own p.
+/// Proportional stretching at constant volume: radial return is exact for any steps, and the stress is Voce's hardening at its own p.
 #[test]
 fn a_return_ends_on_the_surface_and_keeps_the_volume() -> Result<(), Failure> {
     let hardening = Hardening { initial: 20.0, linear: 10.0, saturation: 30.0, rate: 8.0 };
@@ -151,10 +150,8 @@ fn the_cone_of_plane_strain_has_mohr_and_coulomb_s_strength_there() -> Result<()
     let (phi, c) = (25.0_f64, 5.0);
     let (sin, cos) = phi.to_radians().sin_cos();
     for (cone, strength) in [(Cone::PlaneStrain, 1.0), (Cone::Compression, 6.0 / (3.0_f64.sqrt() * (3.0 - sin)))] {
-        let mut point = Point::new(Plastic {
-            solid: solid()?,
-            criterion: DruckerPrager::new(phi, 0.0, Hardening::perfect(c), cone),
-        });
+        let criterion = DruckerPrager::new(phi, 0.0, Hardening::perfect(c), cone);
+        let mut point = Point::new(Plastic { solid: solid()?, criterion });
         let mut tau = Tensor::zeros();
         for step in 0..=200 {
             let sheared = Tensor::<f64, 2>::new(1.0, 0.005 * f64::from(step), 0.0, 1.0);
@@ -185,17 +182,16 @@ fn relaxation_is_exact() -> Result<(), Failure> {
     }
     // At large strain, along the principal axes of the strain: in one branch, the difference of two principal stresses falls by e^{−t/τ_r}.
     let only = Viscoelastic::new(NeoHookean::ciarlet(Lame::new(10.0, 1.0)?), vec![branches[0]]).ok_or("elastic")?;
-    let base = Point::new(Material::from(NeoHookean::ciarlet(Lame::new(10.0, 1.0)?)));
+    let mut base = Point::new(Material::from(NeoHookean::ciarlet(Lame::new(10.0, 1.0)?)));
     let f = Tensor::<f64, 3>::new(1.5, 0.3, 0.0, -0.2, 0.8, 0.1, 0.0, 0.0, 1.1);
-    let (mut point, mut base) = (Point::new(only), base);
+    let mut point = Point::new(only);
     let elastic = base.step(f, 0.0);
     let [at_once, later] = [0.0, 0.8].map(|dt| point.step(f, dt) - elastic);
     assert!((later - at_once * (-0.8_f64 / 0.5).exp()).norm() < 1e-13 * at_once.norm());
     Ok(())
 }
 
-/// Under a constant shear stress γ(t) = (τ/G∞) (1 − G₁/(G∞ + G₁) e^{−t/τ_c}), τ_c = τ_r (G∞ + G₁)/G∞: of first order in Δt. The
-/// extrapolated limit is exact.
+/// Under a constant shear stress γ(t) = (τ/G∞) (1 − G₁/(G∞ + G₁) e^{−t/τ_c}), τ_c = τ_r (G∞ + G₁)/G∞: of first order in Δt.
 #[test]
 fn creep_converges_to_its_closed_form() -> Result<(), Failure> {
     let (base, shear, relaxation_time, time, stress) = (1.0, 3.0, 0.5, 1.5, 1e-8);
@@ -313,26 +309,21 @@ fn energy_is_stored_or_lost() -> Result<(), Failure> {
 #[test]
 fn flow_has_the_same_bits_for_any_threads_and_after_a_restart() -> Result<(), Failure> {
     for material in [METAL, SOIL, POLYMER] {
-        let mut bits: Vec<Vec<u64>> = Vec::new();
-        for threads in [1, 3] {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
-            let memory = pool.install(|| -> Result<_, String> {
-                let mut simulation = membrane(material, 4, &[]).map_err(|error| error.to_string())?;
-                run(&mut simulation).map_err(|error| error.to_string())?;
-                Ok(simulation.particles.by_id().memory)
-            })?;
-            bits.push(memory.iter().map(|x| x.to_bits()).collect());
-        }
-        assert_eq!(bits[0], bits[1]);
+        let by = |threads| {
+            in_threads(threads, || {
+                let mut simulation = membrane(material, 4, &[])?;
+                run(&mut simulation)?;
+                Ok(simulation.particles.by_id())
+            })
+        };
+        let one = by(1)?;
+        assert_eq!(one, by(3)?);
         let start = membrane(material, 4, &[])?;
         let mut simulation = start.clone();
-        for _ in 0..2 {
-            simulation.advance()?;
-        }
+        advance(&mut simulation, 2)?;
         let mut continued = restored(&simulation, &start)?;
         run(&mut continued)?;
-        let memory: Vec<u64> = continued.particles.by_id().memory.iter().map(|x| x.to_bits()).collect();
-        assert_eq!(memory, bits[0]);
+        assert_eq!(continued.particles.by_id(), one);
         let (particles, width) = (&continued.particles, continued.particles.remembered);
         for (field, name) in [(Field::PlasticStrain, PLASTIC_STRAIN), (Field::DissipatedDensity, DISSIPATED)] {
             let shown = field.values(&continued, &Reference::of(&continued))?;
@@ -361,57 +352,26 @@ fn conjugate_gradients_are_refused_where_a_law_makes_the_tangent_unsymmetric() -
     Ok(())
 }
 
-/// (constants of a law, the key to be named, words of the message)
-const NO_SOLID: &[(&str, &str, &str)] = &[
-    (
-        r#"{"von_mises":{"elastic":{"young":1,"poisson":0.3},"yield_stress":{"initial":0}}}"#,
-        "yield_stress.initial",
-        "> 0",
-    ),
-    (
-        r#"{"von_mises":{"elastic":{"young":1,"poisson":0.3},"yield_stress":{"initial":1,"saturation":-2}}}"#,
-        "yield_stress.saturation",
-        "-initial = -1",
-    ),
-    (
-        r#"{"von_mises":{"elastic":{"young":1,"poisson":0.3},"yield_stress":{"initial":1,"saturation":-0.5,"rate":10}}}"#,
-        "yield_stress.rate",
-        "softens faster",
-    ),
-    (
-        r#"{"von_mises":{"elastic":{"young":1,"poisson":0.3},"yield_stress":{"initial":1,"saturation":1}}}"#,
-        "yield_stress.rate",
-        "> 0 with a saturation",
-    ),
-    (
-        r#"{"von_mises":{"elastic":{"young":1,"poisson":0.3},"yield_stress":{"initial":1,"rate":1}}}"#,
-        "yield_stress.rate",
-        "needs a saturation",
-    ),
-    (
-        r#"{"drucker_prager":{"elastic":{"young":1,"poisson":0.3},"friction":90,"cohesion":{"initial":1}}}"#,
-        "friction",
-        "< 90",
-    ),
-    (
-        r#"{"drucker_prager":{"elastic":{"young":1,"poisson":0.3},"friction":20,"dilatancy":30,"cohesion":{"initial":1}}}"#,
-        "dilatancy",
-        "between 0 and the friction, 20",
-    ),
-    (r#"{"viscoelastic":{"base":{"neo_hookean":{"young":1,"poisson":0.3}},"branches":[]}}"#, "branches", "1 to 8"),
-    (
-        r#"{"viscoelastic":{"base":{"von_mises":{"elastic":{"young":1,"poisson":0.3},"yield_stress":{"initial":1}}},"branches":[{"shear":1,"relaxation_time":1}]}}"#,
-        "base",
-        "elastic",
-    ),
-    (r#"{"mooney_rivlin":{"c1":1,"c2":1,"bulk":6}}"#, "bulk", "greater than"),
-    (r#"{"ogden":{"terms":[{"modulus":1,"exponent":-2}],"bulk":6}}"#, "terms[0].modulus", "sign"),
-    (r#"{"ogden":{"terms":[{"modulus":1,"exponent":2}],"bulk":0.5}}"#, "bulk", "greater than"),
-];
+/// Constants of a law | the key to be named | words of the message.
+const NO_SOLID: &str = r##"
+{"von_mises":{"elastic":{"young":1,"poisson":0.3},"yield_stress":{"initial":0}}} | yield_stress.initial | > 0
+{"von_mises":{"elastic":{"young":1,"poisson":0.3},"yield_stress":{"initial":1,"saturation":-2}}} | yield_stress.saturation | -initial = -1
+{"von_mises":{"elastic":{"young":1,"poisson":0.3},"yield_stress":{"initial":1,"saturation":-0.5,"rate":10}}} | yield_stress.rate | softens faster
+{"von_mises":{"elastic":{"young":1,"poisson":0.3},"yield_stress":{"initial":1,"saturation":1}}} | yield_stress.rate | > 0 with a saturation
+{"von_mises":{"elastic":{"young":1,"poisson":0.3},"yield_stress":{"initial":1,"rate":1}}} | yield_stress.rate | needs a saturation
+{"drucker_prager":{"elastic":{"young":1,"poisson":0.3},"friction":90,"cohesion":{"initial":1}}} | friction | < 90
+{"drucker_prager":{"elastic":{"young":1,"poisson":0.3},"friction":20,"dilatancy":30,"cohesion":{"initial":1}}} | dilatancy | between 0 and the friction, 20
+{"viscoelastic":{"base":{"neo_hookean":{"young":1,"poisson":0.3}},"branches":[]}} | branches | 1 to 8
+{"viscoelastic":{"base":{"von_mises":{"elastic":{"young":1,"poisson":0.3},"yield_stress":{"initial":1}}},"branches":[{"shear":1,"relaxation_time":1}]}} | base | elastic
+{"mooney_rivlin":{"c1":1,"c2":1,"bulk":6}} | bulk | greater than
+{"ogden":{"terms":[{"modulus":1,"exponent":-2}],"bulk":6}} | terms[0].modulus | sign
+{"ogden":{"terms":[{"modulus":1,"exponent":2}],"bulk":0.5}} | bulk | greater than
+"##;
 
 #[test]
 fn constants_that_no_solid_has_are_refused() -> Result<(), Failure> {
-    for (text, key, words) in NO_SOLID {
+    for case in cases(NO_SOLID) {
+        let [text, key, words] = case[..] else { return Err(format!("{case:?}").into()) };
         let (mut problems, given) = (Problems::default(), serde_json::from_str::<Parameters>(text)?);
         assert!(given.law(&mut problems, "material").is_none(), "{text}");
         let message = problems.to_string();
@@ -419,8 +379,8 @@ fn constants_that_no_solid_has_are_refused() -> Result<(), Failure> {
         assert_eq!(problems.list.len(), 1, "{message}");
     }
     // A criterion read from a scene equals the criterion in code.
-    let given: Parameters =
-        serde_json::from_str(r#"{"von_mises":{"elastic":{"young":1000,"poisson":0.3},"yield_stress":{"initial":2}}}"#)?;
+    let text = r#"{"von_mises":{"elastic":{"young":1000,"poisson":0.3},"yield_stress":{"initial":2}}}"#;
+    let given: Parameters = serde_json::from_str(text)?;
     let law = given.law(&mut Problems::default(), "material").ok_or("good constants")?;
     assert_eq!(law, von_mises(Hardening::perfect(2.0))?.into());
     Ok(())

@@ -1,25 +1,17 @@
 //! Invalid and malicious input to the program.
 
-use crate::images;
-use crate::support::{Failure, Random};
+use crate::support::{Failure, Random, said, shipped};
+use crate::{images, surfaces};
 use bfree::causes;
 use bfree::checkpoint::{self, Identity};
 use bfree::scene::{self, Scene, SceneError, particle_file, surface_file};
 use bfree::simulation::Simulation;
+use bfree::tensor::Vector;
 use serde_json::{Value, json};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Command;
 use std::time::{Duration, Instant};
-
-fn shipped() -> Result<Vec<String>, Failure> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
-    let mut paths =
-        std::fs::read_dir(folder)?.map(|entry| Ok(entry?.path())).collect::<Result<Vec<PathBuf>, Failure>>()?;
-    paths.retain(|path| path.extension().is_some_and(|ending| ending == "json"));
-    paths.sort();
-    paths.iter().map(|path| Ok(std::fs::read_to_string(path)?)).collect()
-}
 
 /// A value that replaces another one. No such value makes a valid scene much larger.
 fn junk(random: &mut Random) -> Value {
@@ -118,32 +110,12 @@ fn broken(text: &[u8], random: &mut Random) -> Vec<u8> {
     bytes
 }
 
-/// Runs `bfree check` with at most a second of processor time and 4 GB of memory.
+/// Runs `bfree check` with at most a second of processor time and 4 GB of memory. Returns the exit code and standard error.
 #[cfg(unix)]
-fn check(scene: &Path) -> Result<Output, Failure> {
+fn check(scene: &Path) -> Result<(Option<i32>, String), Failure> {
     let script = "ulimit -t 1; ulimit -v 4000000; exec \"$0\" check \"$1\"";
-    Ok(Command::new("sh").args(["-c", script, env!("CARGO_BIN_EXE_bfree")]).arg(scene).output()?)
-}
-
-/// Exit code 0, or 2 with a message that names the file and the key or the line.
-#[cfg(unix)]
-fn judged(path: &Path, text: &str) -> Result<bool, Failure> {
-    let output = check(path)?;
-    let message = String::from_utf8(output.stderr)?;
-    let mut keys = "grid time bodies boundary approximation transfer gravity tractions output initial_velocity title extra solver \
-                    prescribed pressures"
-        .split(' ')
-        .chain(["a scene is an object", " line "]);
-    match output.status.code() {
-        Some(0) => Ok(false),
-        Some(2) => {
-            assert!(message.contains(&path.display().to_string()), "{message}\n{text}");
-            assert!(keys.any(|key| message.contains(key)), "no key: {message}\n{text}");
-            assert!(message.len() < 100_000, "{text}");
-            Ok(true)
-        }
-        code => Err(format!("{code:?} {}: {message}\n{text}", output.status).into()),
-    }
+    let (code, _, message) = said(Command::new("sh").args(["-c", script, env!("CARGO_BIN_EXE_bfree")]).arg(scene))?;
+    Ok((code, message))
 }
 
 #[cfg(unix)]
@@ -157,19 +129,20 @@ fn a_gigabyte_is_refused_before_it_is_read() -> Result<(), Failure> {
     let error = scene::read_file(&path, &[]).expect_err("a gigabyte");
     assert!(matches!(error, SceneError::TooLong(Some(length)) if length == 1 << 30), "{error}");
     assert!(start.elapsed() < Duration::from_secs(1));
-    let output = check(&path)?;
-    let message = String::from_utf8(output.stderr)?;
-    assert_eq!(output.status.code(), Some(2), "{message}");
+    let (code, message) = check(&path)?;
+    assert_eq!(code, Some(2), "{message}");
     assert!(message.contains("large.json") && message.contains("1073741824 bytes"), "{message}");
     // A particle file with one line of a gigabyte: reading stops after four kilobytes.
     let text = r#"{"grid": {"size": [4, 4], "spacing": 1}, "time": {"step": 0.1, "end": 1}, "bodies": [{"name": "a",
         "particles": {"file": "large.json"}, "density": 1, "material": {"neo_hookean": {"bulk": 1, "shear": 1}}}]}"#;
     let scene = folder.path().join("scene.json");
     std::fs::write(&scene, text)?;
-    assert!(judged(&scene, text)?);
+    let (code, message) = check(&scene)?;
+    let named = ["scene.json", "bodies[0].particles.file"].iter().all(|words| message.contains(words));
+    assert!(code == Some(2) && named && message.len() < 100_000, "{message}");
     // A device without an end.
-    let output = check(Path::new("/dev/zero"))?;
-    assert_eq!(output.status.code(), Some(2), "{}", String::from_utf8(output.stderr)?);
+    let (code, message) = check(Path::new("/dev/zero"))?;
+    assert_eq!(code, Some(2), "{message}");
     Ok(())
 }
 
@@ -186,11 +159,8 @@ fn moduli_and_densities_near_the_least_number_run_or_are_refused_by_key() -> Res
             [((least, "1"), "bodies[0].density"), (("1", least), "bodies[0].material.neo_hookean.young")]
         {
             let message = scene::read(base, &set(given.0, given.1)?).expect_err(least).to_string();
-            assert!(
-                message
-                    .contains(&format!("{key}: {least} is not allowed; must be greater than 1e-100 and at most 1e100")),
-                "{message}"
-            );
+            let expected = format!("{key}: {least} is not allowed; must be greater than 1e-100 and at most 1e100");
+            assert!(message.contains(&expected), "{message}");
         }
     }
     // Free flight of a soft body, or of one whose stiffness does not reduce the step to round-off.
@@ -232,14 +202,8 @@ fn checkpointed(folder: &Path) -> Result<(Identity, Simulation<2>, Vec<u8>), Fai
         "shape": {"box": {"min": [1, 1], "max": [2, 2]}}, "density": 1, "material": {"neo_hookean": {"bulk": 1, "shear": 1}}}],
         "output": {"checkpoint": 0.1}}"#;
     std::fs::write(&path, text)?;
-    let status = Command::new(env!("CARGO_BIN_EXE_bfree"))
-        .arg("run")
-        .arg(&path)
-        .arg("--out")
-        .arg(folder)
-        .arg("--quiet")
-        .status()?;
-    assert!(status.success());
+    let mut run = Command::new(env!("CARGO_BIN_EXE_bfree"));
+    assert!(run.arg("run").arg(&path).arg("--out").arg(folder).arg("--quiet").status()?.success());
     let scene = scene::read_file(&path, &[])?;
     let simulation = scene.build::<2>(folder)?;
     let identity = Identity::new(serde_json::to_value(&scene)?, &simulation.particles);
@@ -254,7 +218,8 @@ struct Inputs {
     texts: Vec<String>,
     scenes: Vec<Value>,
     picture: Vec<u8>,
-    stl: Vec<u8>,
+    /// One box as a binary and as a written STL file, and as PLY.
+    surfaces: [Vec<u8>; 3],
     /// A scene whose body has the shape of the picture.
     pictured: Scene,
     identity: Identity,
@@ -264,32 +229,22 @@ struct Inputs {
 
 const TABLE: &[u8] = b"x,y,volume,vx,vy\n1,1,0.25,0,0\n1.5,1,0.25,1e-3,-2\n2,1,0.25,0,0\n";
 
-/// A tetrahedron.
-const PLY: &[u8] = b"ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
-    element face 4\nproperty list uchar int vertex_indices\nend_header\n\
-    0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n";
-
-/// The same tetrahedron.
-fn stl() -> Result<Vec<u8>, Failure> {
-    let mut stl = Vec::new();
-    let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(stl_io::Vertex::new);
-    let sides = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]].map(|side| side.map(|i: usize| corners[i]));
-    let sides = sides.map(|vertices| stl_io::Triangle { normal: stl_io::Normal::new([0.0; 3]), vertices });
-    stl_io::write_stl(&mut stl, sides.iter())?;
-    Ok(stl)
-}
-
 impl Inputs {
     fn new() -> Result<Self, Failure> {
         let folder = tempfile::tempdir()?;
-        let texts = shipped()?;
+        let texts = shipped()?.iter().map(std::fs::read_to_string).collect::<Result<Vec<_>, _>>()?;
         let scenes: Vec<Value> = texts.iter().map(|text| serde_json::from_str(text)).collect::<Result<_, _>>()?;
         let (identity, fresh, checkpoint) = checkpointed(folder.path())?;
         let bytes: Vec<u8> = (0..600_u32).map(|i| (i * 7 % 256) as u8).collect();
         let picture = images::grey([30, 20], &bytes)?;
         let image = json!({"file": "fuzz.png", "min": [1, 1], "max": [3, 3], "values": [0, 100]});
         let pictured = scene::read(&images::scene_of(&[4, 4], &[images::body("a", &image)], json!({})), &[])?;
-        Ok(Self { folder, texts, scenes, picture, stl: stl()?, pictured, identity, fresh, checkpoint })
+        let cube = surfaces::cuboid(Vector::repeat(1.0), Vector::repeat(2.0));
+        let stl = folder.path().join("whole.stl");
+        surfaces::stl(&cube, &stl)?;
+        let surfaces =
+            [std::fs::read(stl)?, surfaces::ascii_stl(&cube).into_bytes(), surfaces::ply(&cube).into_bytes()];
+        Ok(Self { folder, texts, scenes, picture, surfaces, pictured, identity, fresh, checkpoint })
     }
 
     /// The input of a kind, 0 to 12.
@@ -299,8 +254,8 @@ impl Inputs {
             6 | 7 => broken(random.of(&self.texts).clone().as_bytes(), random),
             8 => broken(TABLE, random),
             9 => broken(&self.picture, random),
-            10 => broken(&self.stl, random),
-            11 => broken(PLY, random),
+            10 => broken(&self.surfaces[random.below(2) as usize], random),
+            11 => broken(&self.surfaces[2], random),
             _ => broken(&self.checkpoint, random),
         }
     }

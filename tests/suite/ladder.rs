@@ -1,19 +1,16 @@
 //! A scene costs only what it requires. Each feature that is left out saves passes over the particles or bytes, and increases neither. The
 //! size of the box around a body costs nothing.
 
-use crate::support::{Failure, output, scene};
+use crate::support::{Failure, Watched, output, scene};
 use bfree::field::Field;
-use bfree::material::{ClosedTangent, Lame, Law, Material, MaterialState, NeoHookean};
+use bfree::material::{Lame, NeoHookean};
 use bfree::output::{OutputSettings, Recorder, Reference};
-use bfree::particles::Body;
 use bfree::phases::Phase;
 use bfree::plan::Plan;
-use bfree::scalar::Real;
 use bfree::simulation::Simulation;
-use bfree::tensor::Tensor;
 use serde_json::json;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::Ordering;
 
 /// The cost of a step, without iterations.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -115,77 +112,20 @@ fn the_box_around_a_body_costs_nothing() -> Result<(), Failure> {
     Ok(())
 }
 
-/// Ciarlet's law with counters of energy and stress evaluations.
-#[derive(Clone, Debug)]
-struct Counting {
-    law: NeoHookean,
-    energies: Arc<AtomicU64>,
-    stresses: Arc<AtomicU64>,
-}
-
-impl Law for Counting {
-    fn energy<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> T {
-        self.energies.fetch_add(1, Ordering::Relaxed);
-        self.law.energy(at)
-    }
-
-    fn stress<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> Tensor<T, D> {
-        self.stresses.fetch_add(1, Ordering::Relaxed);
-        self.law.stress(at)
-    }
-
-    fn elasticity<const D: usize>(&self, at: &MaterialState<f64, D>, x: &Tensor<f64, D>) -> Tensor<f64, D> {
-        self.law.elasticity(at, x)
-    }
-}
-
-/// A law of the list that counts how often the transfer asks for its kind.
-#[derive(Clone, Debug)]
-struct Asked {
-    law: Material,
-    times: Arc<AtomicU64>,
-}
-
-impl Law for Asked {
-    fn energy<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> T {
-        self.law.energy(at)
-    }
-
-    fn stress<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> Tensor<T, D> {
-        self.law.stress(at)
-    }
-
-    fn elasticity<const D: usize>(&self, at: &MaterialState<f64, D>, x: &Tensor<f64, D>) -> Tensor<f64, D> {
-        self.law.elasticity(at, x)
-    }
-
-    fn closed<const D: usize>(
-        &self,
-        f_n: &Tensor<f64, D>,
-        at: &MaterialState<f64, D>,
-        volume: f64,
-    ) -> Option<ClosedTangent<f64, D>> {
-        self.law.closed(f_n, at, volume)
-    }
-
-    fn shipped(&self) -> Option<&dyn std::any::Any> {
-        self.times.fetch_add(1, Ordering::Relaxed);
-        Some(&self.law)
-    }
-}
-
-/// For the first step of the falling block, in two halves or whole: the number of times the law is asked for its kind, and the passes over
-/// the particles.
+/// In the first step of the falling block: how often its laws are asked for their kind, the passes over the particles, and their number.
 fn asked(bodies: &str, spacing: f64) -> Result<(u64, u64, u64), Failure> {
     let overrides = [format!("bodies={bodies}"), format!("grid.spacing={spacing}"), "output={}".to_owned()];
     let overrides: Vec<&str> = overrides.iter().map(String::as_str).collect();
-    let times = Arc::new(AtomicU64::new(0));
-    let asked = |body: &Body<Material>| Asked { law: body.law.clone(), times: Arc::clone(&times) };
-    let mut simulation = scene::<2>("compaction_confined.json", &overrides)?.with_laws(asked);
-    times.store(0, Ordering::Relaxed);
+    let calls = Arc::default();
+    let mut simulation = scene::<2>("compaction_confined.json", &overrides)?.with_laws(|body| Watched {
+        listed: true,
+        calls: Arc::clone(&calls),
+        ..Watched::unlisted(body.law.clone(), true)
+    });
+    calls.kinds.store(0, Ordering::Relaxed);
     let report = simulation.advance()?;
     let passes = report.seconds.passes().iter().sum();
-    Ok((times.load(Ordering::Relaxed), passes, simulation.particles.len() as u64))
+    Ok((calls.kinds.load(Ordering::Relaxed), passes, simulation.particles.len() as u64))
 }
 
 #[test]
@@ -211,10 +151,9 @@ fn a_law_is_chosen_once_a_pass_and_not_for_every_particle() -> Result<(), Failur
 
 #[test]
 fn fields_not_asked_for_are_not_computed() -> Result<(), Failure> {
-    let (energies, stresses) = (Arc::new(AtomicU64::new(0)), Arc::new(AtomicU64::new(0)));
-    let law = NeoHookean::ciarlet(Lame::new(5e4, 3e4)?);
-    let counting = |_: &_| Counting { law, energies: Arc::clone(&energies), stresses: Arc::clone(&stresses) };
-    let simulation = scene::<2>("column_static.json", &[])?.with_laws(counting);
+    let law = Watched::unlisted(NeoHookean::ciarlet(Lame::new(5e4, 3e4)?).into(), false);
+    let simulation = scene::<2>("column_static.json", &[])?.with_laws(|_| law.clone());
+    let (energies, stresses) = (&law.calls.energies, &law.calls.stresses);
     let particles = simulation.particles.len() as u64;
     let folder = tempfile::tempdir()?;
     // (fields, stresses of a snapshot: one in the plane and one out of it)

@@ -13,6 +13,7 @@ mod dynamics;
 mod equilibrium;
 mod examples;
 mod flow;
+mod foreign;
 mod hostile;
 mod images;
 mod kept;

@@ -245,9 +245,9 @@ impl Writer {
             }
         } else if let Some(keys) = schema["properties"].as_object() {
             self.text.push_str("\n| key | value | |\n|---|---|---|\n");
-            let required = required(schema);
             for (key, value) in keys {
-                let must = if required.contains(&key.as_str()) { "**Required.** " } else { "" };
+                let required = schema["required"].as_array().is_some_and(|keys| keys.contains(&key.as_str().into()));
+                let must = if required { "**Required.** " } else { "" };
                 let kind = self.kind(value);
                 self.row(&format!("`{key}`"), &kind, &format!("{must}{}", about(value)));
             }
@@ -309,8 +309,4 @@ impl Writer {
 
 fn about(schema: &Value) -> String {
     schema["description"].as_str().unwrap_or_default().split_whitespace().collect::<Vec<_>>().join(" ")
-}
-
-fn required(schema: &Value) -> Vec<&str> {
-    schema["required"].as_array().into_iter().flatten().filter_map(Value::as_str).collect()
 }

@@ -1,12 +1,11 @@
 //! A law with internal variables: restarts, failed steps and reordering must keep them.
 
-use crate::support::{Failure, Random, restored, scene};
+use crate::support::{Failure, Random, advance, restored, scene};
 use bfree::material::{InternalVariable, Lame, Law, MaterialState, NeoHookean};
 use bfree::particles::Particles;
 use bfree::scalar::Real;
 use bfree::simulation::Simulation;
 use bfree::tensor::{Tensor, contract, scaled};
-use std::num::NonZeroU64;
 
 /// Ciarlet's solid softens with the largest strain energy W so far: S = e^(−κ/k) S₀, with κ' = κ + (W − κ) Δt/(τ + Δt) where W > κ. The
 /// softening takes about the time τ. Internal variables: κ and, for the test, the age of the particle. A solid that does not soften has
@@ -121,9 +120,7 @@ fn particles_remember_at_the_end_of_every_step_what_their_law_says() -> Result<(
     // Softening changes the motion: without it the discs separate with other velocities.
     let mut elastic = collision(&[])?.with_laws(|body| Softening { softens: false, ..body.law });
     assert!(elastic.particles.memory.is_empty());
-    for _ in 0..STEPS {
-        elastic.advance()?;
-    }
+    advance(&mut elastic, STEPS)?;
     let parted = elastic.particles.momentum() - simulation.particles.momentum();
     let (with, without) = (simulation.particles.by_id(), elastic.particles.by_id());
     let apart = with.velocity.iter().zip(&without.velocity).map(|(a, b)| (a - b).norm());
@@ -132,30 +129,14 @@ fn particles_remember_at_the_end_of_every_step_what_their_law_says() -> Result<(
 }
 
 #[test]
-fn the_tangent_of_a_law_with_memory_is_the_derivative_of_its_residual() -> Result<(), Failure> {
-    for step in [0.02, 0.005] {
-        let mut simulation = collision(&[&format!("time.step={step}")])?;
-        simulation.settings.check_tangent = NonZeroU64::new(1);
-        for _ in 0..STEPS {
-            simulation.advance()?;
-        }
-    }
-    Ok(())
-}
-
-#[test]
 fn a_restart_knows_what_particles_remember() -> Result<(), Failure> {
     let start = collision(&[])?;
     let mut simulation = start.clone();
-    for _ in 0..STEPS / 2 {
-        simulation.advance()?;
-    }
+    advance(&mut simulation, STEPS / 2)?;
     let mut continued = restored(&simulation, &start)?;
     assert!(continued.particles.memory.iter().any(|x| *x > 0.0) && continued.particles == simulation.particles);
-    for _ in 0..STEPS / 2 {
-        simulation.advance()?;
-        continued.advance()?;
-    }
+    advance(&mut simulation, STEPS / 2)?;
+    advance(&mut continued, STEPS / 2)?;
     assert_eq!(continued.particles, simulation.particles);
     // The same scene with laws without internal variables is another run.
     let forgetful = start.with_laws(|body| Softening { softens: false, ..body.law });
@@ -190,30 +171,13 @@ fn memory_follows_its_particle_wherever_it_lies() -> Result<(), Failure> {
     let mut one = collision(&[])?;
     let (mut random, mut other) = (Random(9), one.clone());
     for _ in 0..STEPS / 6 {
-        let mut order: Vec<u32> = (0..other.particles.len() as u32).collect();
-        for last in (1..order.len()).rev() {
-            order.swap(last, random.below(last as u64 + 1) as usize);
-        }
         let before = other.particles.by_id();
-        other.rearrange(&order);
+        other.rearrange(&random.order(before.len()));
         assert_eq!(other.particles.by_id(), before);
-        for _ in 0..6 {
-            one.advance()?;
-            other.advance()?;
-        }
+        advance(&mut one, 6)?;
+        advance(&mut other, 6)?;
         assert_eq!(one.particles.by_id(), other.particles.by_id());
     }
     assert!(one.particles.memory.iter().any(|x| *x > 0.0));
-    Ok(())
-}
-
-#[test]
-fn what_remembers_nothing_has_no_memory() -> Result<(), Failure> {
-    let mut simulation = scene::<2>("rebound.json", &[])?;
-    for _ in 0..2 {
-        simulation.advance()?;
-        assert_eq!((simulation.particles.memory.len(), simulation.particles.remembered), (0, 0));
-        assert!(simulation.particles.state(0, 1.0).internal.is_empty());
-    }
     Ok(())
 }

@@ -1,12 +1,11 @@
 //! Multigrid: it must not change the results, and must save iterations.
 
-use crate::support::{Failure, built};
+use crate::support::{Failure, built, merged, solid};
 use bfree::mechanics::check::direction;
-use bfree::mechanics::loads::PrescribedDof;
 use bfree::mechanics::sweep::Supports;
 use bfree::mechanics::transfer::Nodal;
 use bfree::simulation::Simulation;
-use bfree::solver::{LinearOperator, Multigrid, Preconditioner, Preconditioning};
+use bfree::solver::{Multigrid, Preconditioner, Preconditioning};
 use serde_json::{Value, json};
 
 /// A block on a fixed floor under its weight. Its sides lie between cell faces.
@@ -15,22 +14,16 @@ pub fn block<const D: usize>(family: &Value, cells: u32, inertia: &str, more: Va
     let (mut min, mut max, mut down) = (vec![low; D], vec![high; D], vec![0.0; D]);
     (min[D - 1], max[D - 1], down[D - 1]) = (0.0, 1.0, -50.0);
     let floor = ["left", "bottom", "back"][D - 1];
-    let mut scene = json!({
+    let scene = json!({
         "grid": {"size": vec![2; D], "spacing": 1.0 / f64::from(cells)},
         "approximation": family,
         "time": {"step": 0.2, "end": 1, "scheme": inertia},
-        "bodies": [{
-            "name": "block", "shape": {"box": {"min": min, "max": max}}, "density": 1,
-            "material": {"neo_hookean": {"young": 1000, "poisson": 0.3}}, "particles_per_cell": 2
-        }],
+        "bodies": [solid("block", 1000, json!({"box": {"min": min, "max": max}}))],
         "boundary": {floor: "fixed"},
         "gravity": {"acceleration": down},
         "solver": {"krylov": {"method": "conjugate_gradient", "forcing": {"fixed": 1e-8}}}
     });
-    for (key, value) in more.as_object().into_iter().flatten() {
-        scene[key] = value.clone();
-    }
-    built(&scene)
+    built(&merged(scene, more))
 }
 
 /// Takes one step. Returns the Krylov iterations per Newton iteration.
@@ -94,21 +87,6 @@ fn cubic_splines_take_few_iterations_too() -> Result<(), Failure> {
     Ok(())
 }
 
-/// z = M⁻¹ r for a direction that leaves prescribed nodes alone.
-fn applied<const D: usize>(
-    inverse: &dyn LinearOperator,
-    prescribed: &[PrescribedDof],
-    nodes: usize,
-    number: u64,
-) -> [Vec<f64>; 2] {
-    let mut r = direction::<D>(nodes, number);
-    prescribed.iter().for_each(|dof| r[dof.node][dof.component] = 0.0);
-    let r: Vec<f64> = r.iter().flat_map(|r| r.iter().copied()).collect();
-    let mut z = vec![0.0; r.len()];
-    inverse.apply(&r, &mut z);
-    [r, z]
-}
-
 /// M⁻¹ is symmetric and positive, as conjugate gradients require.
 #[test]
 fn a_cycle_is_symmetric_and_positive() -> Result<(), Failure> {
@@ -121,25 +99,31 @@ fn a_cycle_is_symmetric_and_positive() -> Result<(), Failure> {
     let tangent = equilibrium.tangent(&at_rest)?;
     let mut multigrid = Multigrid::<2>::default();
     let inverse = multigrid.prepare(&tangent);
-    let of = |inverse: &dyn LinearOperator, number| applied::<2>(inverse, &prescribed, nodes.len(), number);
+    // r, for a direction that leaves prescribed nodes alone, and z = M⁻¹ r.
+    let of = |number| {
+        let mut r = direction::<2>(nodes.len(), number);
+        prescribed.iter().for_each(|dof| r[dof.node][dof.component] = 0.0);
+        let r: Vec<f64> = r.iter().flatten().copied().collect();
+        let mut z = vec![0.0; r.len()];
+        inverse.apply(&r, &mut z);
+        [r, z]
+    };
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-    let ([a, of_a], [b, of_b]) = (of(&*inverse, 1), of(&*inverse, 2));
+    let ([a, of_a], [b, of_b]) = (of(1), of(2));
     let size = (dot(&a, &of_a) * dot(&b, &of_b)).sqrt();
     assert!(dot(&a, &of_a) > 0.0 && dot(&b, &of_b) > 0.0);
     assert!((dot(&a, &of_b) - dot(&b, &of_a)).abs() < 1e-12 * size);
     Ok(())
 }
 
-/// At the surface of a ball whose lower part is held, prescribed nodes lead others. The matrix of the coarsest grid must have no entries of
-/// prescribed nodes.
+/// At the surface of a ball whose lower part is held, prescribed nodes lead others. The matrix of the coarsest grid has no entries of them.
 #[test]
 fn held_nodes_that_lead_others_do_not_spoil_the_coarsest_grid() -> Result<(), Failure> {
     let scene = json!({
         "grid": {"size": [2, 2], "spacing": 0.05},
         "approximation": "linear",
         "time": {"step": 1, "end": 1, "scheme": "none"},
-        "bodies": [{"name": "ball", "shape": {"ball": {"center": [0.93, 0.93], "radius": 0.5}}, "density": 1,
-                    "material": {"neo_hookean": {"young": 1000, "poisson": 0.3}}}],
+        "bodies": [solid("ball", 1000, json!({"ball": {"center": [0.93, 0.93], "radius": 0.5}}))],
         "gravity": {"acceleration": [0, -50]},
         "prescribed": [{"region": {"half_space": {"point": [0, 0.601], "normal": [0, 1]}}, "displacement": [[0, [0, 0]]]}],
         "solver": {"krylov": {"preconditioner": "multigrid", "forcing": {"fixed": 1e-8}}}

@@ -1,23 +1,16 @@
 //! A killed run continues with the same bits, and a faulty checkpoint is reported.
 
-use crate::support::{Failure, Random};
+use crate::support::{Failure, Random, Said, said};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 /// The rebound with walls, smoothing and probes, up to the first impact and back; a checkpoint every 20 steps.
-const SMOOTHED: [&str; 8] = [
-    "--set",
-    r#"transfer={"blend": {"rate": 0.05}}"#,
-    "--set",
-    "output.checkpoint=1",
-    "--set",
-    "bodies.0.velocity=[2, 0.1]",
-    "--until",
-    "12",
-];
+const SMOOTHED: [&str; 8] = ["--set", BLEND, "--set", "output.checkpoint=1", "--set", FAST, "--until", "12"];
+const BLEND: &str = r#"transfer={"blend": {"rate": 0.05}}"#;
+const FAST: &str = "bodies.0.velocity=[2, 0.1]";
 
 fn program(scene: &str, directory: &Path, arguments: &[&str]) -> Command {
     let mut program = Command::new(env!("CARGO_BIN_EXE_bfree"));
@@ -27,16 +20,18 @@ fn program(scene: &str, directory: &Path, arguments: &[&str]) -> Command {
     program
 }
 
-fn run(scene: &str, directory: &Path, arguments: &[&[&str]]) -> Result<Output, Failure> {
-    Ok(program(scene, directory, &arguments.concat()).output()?)
+fn run(scene: &str, directory: &Path, arguments: &[&[&str]]) -> Result<Said, Failure> {
+    said(&mut program(scene, directory, &arguments.concat()))
 }
 
-fn message(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
+/// A run that succeeds. Returns its standard error.
+fn done(scene: &str, directory: &Path, arguments: &[&[&str]]) -> Result<String, Failure> {
+    let (code, _, text) = run(scene, directory, arguments)?;
+    assert_eq!(code, Some(0), "{text}");
+    Ok(text)
 }
 
-/// All files of a run except its checkpoints. The report lacks the entries that may differ: seconds, and the place and extent of the first
-/// run.
+/// All files of a run but its checkpoints. The report lacks what may differ: seconds, and the place and extent of the first run.
 fn files(directory: &Path) -> Result<BTreeMap<String, Vec<u8>>, Failure> {
     let mut files = BTreeMap::new();
     for entry in std::fs::read_dir(directory)? {
@@ -79,58 +74,40 @@ fn a_shortened_last_step_is_taken_back_by_a_restart() -> Result<(), Failure> {
     let folder = tempfile::tempdir()?;
     let (whole, parts) = (folder.path().join("whole"), folder.path().join("parts"));
     let common = ["--quiet", "--set", "output.every=0.1", "--set", "output.checkpoint=1"];
-    assert!(run("rebound.json", &whole, &[&common, &["--until", "0.73"]])?.status.success());
-    assert!(run("rebound.json", &parts, &[&common, &["--until", "0.32"]])?.status.success());
+    done("rebound.json", &whole, &[&common, &["--until", "0.73"]])?;
+    done("rebound.json", &parts, &[&common, &["--until", "0.32"]])?;
     let history = std::fs::read_to_string(parts.join("history.csv"))?;
     assert!(history.lines().last().is_some_and(|row| row.starts_with("7,0.32,0.0")), "{history}");
-    assert!(run("rebound.json", &parts, &[&common, &["--until", "0.73", "--restart"]])?.status.success());
+    done("rebound.json", &parts, &[&common, &["--until", "0.73", "--restart"]])?;
     assert_same(&whole, &parts)?;
     // A restart cannot end before the time already reached.
-    let earlier = run("rebound.json", &parts, &[&common, &["--until", "0.3", "--restart"]])?;
-    let text = String::from_utf8_lossy(&earlier.stderr);
-    assert!(!earlier.status.success() && text.contains("beyond the end, t = 0.3"), "{text}");
+    let (code, _, text) = run("rebound.json", &parts, &[&common, &["--until", "0.3", "--restart"]])?;
+    assert!(code != Some(0) && text.contains("beyond the end, t = 0.3"), "{text}");
     Ok(())
 }
+
+const HALF: &str = "output.checkpoint=0.5";
+const TENTH: &str = "output.checkpoint=0.1";
+const ALONG_A_PATH: &str = r#"time={"step":0.02,"end":0.3,"scheme":"arc_length"}"#;
 
 /// (scene, keys that are set, further arguments)
 const IN_PARTS: [(&str, &[&str], &[&str]); 8] = [
     // Walls and smoothing.
-    ("rebound.json", &[SMOOTHED[1], SMOOTHED[3], SMOOTHED[5]], &["--until", "12"]),
+    ("rebound.json", &[BLEND, "output.checkpoint=1", FAST], &["--until", "12"]),
     // A prescribed motion with work and a load.
-    ("compaction.json", &["output.checkpoint=0.1"], &["--until", "0.5", "--threads", "2"]),
+    ("compaction.json", &[TENTH], &["--until", "0.5", "--threads", "2"]),
     // Halved steps among whole ones.
-    (
-        "rebound_fast.json",
-        &["time.step=0.2", "solver.newton.max_iterations=3", "output.checkpoint=0.5"],
-        &["--until", "6"],
-    ),
+    ("rebound_fast.json", &["time.step=0.2", "solver.newton.max_iterations=3", HALF], &["--until", "6"]),
     // Along an equilibrium path, whose loads fall.
-    (
-        "elastica.json",
-        &[
-            r#"time={"step":0.02,"end":0.3,"scheme":"arc_length"}"#,
-            "grid.spacing=0.5",
-            "output.every=0.1",
-            "output.checkpoint=0.1",
-        ],
-        &[],
-    ),
+    ("elastica.json", &[ALONG_A_PATH, "grid.spacing=0.5", "output.every=0.1", TENTH], &[]),
     // Inertia with one reference configuration, reset when the body meets a wall.
     ("rebound.json", &[r#"grid.reset="never""#, "output.checkpoint=1"], &["--until", "12"]),
     // Load steps without a grid reset.
     ("column_static.json", &["output.checkpoint=0.2", "time.step=0.04"], &[]),
     // Steps of adaptive length.
-    (
-        "rebound_fast.json",
-        &["time.step=0.4", r#"time.adaptive={"tolerance":1e-3}"#, "output.checkpoint=0.5"],
-        &["--until", "10"],
-    ),
+    ("rebound_fast.json", &["time.step=0.4", r#"time.adaptive={"tolerance":1e-3}"#, HALF], &["--until", "10"]),
     // Load steps with occasional grid resets, which carry over the out-of-balance force.
-    (
-        "elastica.json",
-        &[r#"grid.reset={"strain":0.05}"#, "grid.spacing=0.5", "time.step=0.02", "output.checkpoint=0.1"],
-        &[],
-    ),
+    ("elastica.json", &[r#"grid.reset={"strain":0.05}"#, "grid.spacing=0.5", "time.step=0.02", TENTH], &[]),
 ];
 
 #[test]
@@ -140,11 +117,10 @@ fn a_run_in_three_parts_has_the_bits_of_one() -> Result<(), Failure> {
         let set = sets.iter().flat_map(|set| ["--set", *set]);
         let arguments: Vec<&str> = set.chain(more.iter().copied()).collect();
         let (whole, parts) = (folder.path().join(format!("whole{k}")), folder.path().join(format!("parts{k}")));
-        assert!(run(scene, &whole, &[&arguments])?.status.success());
+        done(scene, &whole, &[&arguments])?;
         for part in [&["--steps", "7"][..], &["--steps", "23", "--restart"], &["--restart"]] {
-            let output = run(scene, &parts, &[&arguments, part])?;
-            assert!(output.status.success(), "{}", message(&output));
-            assert!(part.len() == 2 || message(&output).contains("continues at t = "), "{}", message(&output));
+            let text = done(scene, &parts, &[&arguments, part])?;
+            assert!(part.len() == 2 || text.contains("continues at t = "), "{text}");
         }
         assert_same(&whole, &parts)?;
         let steps = std::fs::read_to_string(whole.join("newton.jsonl"))?;
@@ -160,40 +136,37 @@ fn a_run_killed_at_any_moment_ends_in_the_same_bits() -> Result<(), Failure> {
     let folder = tempfile::tempdir()?;
     let whole = folder.path().join("whole");
     let start = Instant::now();
-    assert!(run("rebound.json", &whole, &[&SMOOTHED])?.status.success());
+    done("rebound.json", &whole, &[&SMOOTHED])?;
     let duration = start.elapsed().as_micros() as u64;
     let mut random = Random(6);
-    let (mut done, mut middle) = (0, 0);
-    while done < kills {
-        let killed = folder.path().join(format!("killed{done}"));
+    let (mut killed, mut middle) = (0, 0);
+    while killed < kills {
+        let parts = folder.path().join(format!("killed{killed}"));
+        let restart = || if checkpoints(&parts).is_empty() { &[][..] } else { &["--restart"] };
         loop {
-            let restart: &[&str] = if checkpoints(&killed).is_empty() { &[] } else { &["--restart"] };
-            let mut child = program("rebound.json", &killed, &[&SMOOTHED, restart].concat()).spawn()?;
+            let mut child = program("rebound.json", &parts, &[&SMOOTHED, restart()].concat()).spawn()?;
             std::thread::sleep(Duration::from_micros(random.below(duration)));
             child.kill()?;
             let finished = child.wait()?.success();
-            done += usize::from(!finished);
-            middle += usize::from(!finished && !checkpoints(&killed).is_empty());
-            if finished || random.below(2) == 0 || done == kills {
+            killed += usize::from(!finished);
+            middle += usize::from(!finished && !checkpoints(&parts).is_empty());
+            if finished || random.below(2) == 0 || killed == kills {
                 break;
             }
         }
-        let restart: &[&str] = if checkpoints(&killed).is_empty() { &[] } else { &["--restart"] };
-        let output = run("rebound.json", &killed, &[&SMOOTHED, restart])?;
-        assert!(output.status.success(), "{}", message(&output));
-        assert!(!message(&output).contains("cannot be used"), "{}", message(&output));
-        assert_same(&whole, &killed)?;
-        std::fs::remove_dir_all(&killed)?;
+        let text = done("rebound.json", &parts, &[&SMOOTHED, restart()])?;
+        assert!(!text.contains("cannot be used"), "{text}");
+        assert_same(&whole, &parts)?;
+        std::fs::remove_dir_all(&parts)?;
     }
-    println!("{done} kills, {middle} of them with a checkpoint to continue from");
+    println!("{killed} kills, {middle} of them with a checkpoint to continue from");
     assert!(middle > 0, "no kill found a checkpoint");
     Ok(())
 }
 
 /// A run of 60 of 240 steps, with its checkpoints: the newer one at step 60, the other at step 40.
 fn cut(directory: &Path) -> Result<(), Failure> {
-    let output = run("rebound.json", directory, &[&SMOOTHED, &["--steps", "59"]])?;
-    assert!(output.status.success(), "{}", message(&output));
+    done("rebound.json", directory, &[&SMOOTHED, &["--steps", "59"]])?;
     assert_eq!(checkpoints(directory).len(), 2);
     Ok(())
 }
@@ -211,7 +184,7 @@ fn copy(from: &Path, to: &Path) -> Result<(), Failure> {
 fn the_last_good_checkpoint_is_used_and_said_so() -> Result<(), Failure> {
     let folder = tempfile::tempdir()?;
     let (whole, first) = (folder.path().join("whole"), folder.path().join("first"));
-    assert!(run("rebound.json", &whole, &[&SMOOTHED])?.status.success());
+    done("rebound.json", &whole, &[&SMOOTHED])?;
     cut(&first)?;
     // Steps 0, 20, 40 and 59, in turns: the last is in the second file.
     let newest = "checkpoint_1.bfree";
@@ -237,9 +210,7 @@ fn the_last_good_checkpoint_is_used_and_said_so() -> Result<(), Failure> {
         let damaged = folder.path().join(format!("damaged{k}"));
         copy(&first, &damaged)?;
         std::fs::write(damaged.join(newest), bytes)?;
-        let output = run("rebound.json", &damaged, &[&SMOOTHED, &["--restart"]])?;
-        let text = message(&output);
-        assert!(output.status.success(), "{text}");
+        let text = done("rebound.json", &damaged, &[&SMOOTHED, &["--restart"]])?;
         assert!(text.contains("warning: a checkpoint cannot be used") && text.contains(newest), "{text}");
         assert!(text.contains(words) && text.contains("step 40, from"), "{words}: {text}");
         assert_same(&whole, &damaged)?;
@@ -250,8 +221,7 @@ fn the_last_good_checkpoint_is_used_and_said_so() -> Result<(), Failure> {
     let history = std::fs::read_to_string(shorter.join("history.csv"))?;
     let lines: Vec<&str> = history.split_inclusive('\n').collect();
     std::fs::write(shorter.join("history.csv"), lines[..50].concat())?;
-    let output = run("rebound.json", &shorter, &[&SMOOTHED, &["--restart"]])?;
-    let text = message(&output);
+    let text = done("rebound.json", &shorter, &[&SMOOTHED, &["--restart"]])?;
     assert!(text.contains("history.csv ends before") && text.contains("step 40, from"), "{text}");
     assert_same(&whole, &shorter)
 }
@@ -260,22 +230,17 @@ fn the_last_good_checkpoint_is_used_and_said_so() -> Result<(), Failure> {
 fn a_missing_snapshot_is_named_and_the_run_goes_on() -> Result<(), Failure> {
     let folder = tempfile::tempdir()?;
     let (whole, first) = (folder.path().join("whole"), folder.path().join("first"));
-    assert!(run("rebound.json", &whole, &[&SMOOTHED])?.status.success());
+    done("rebound.json", &whole, &[&SMOOTHED])?;
     cut(&first)?;
     std::fs::remove_file(first.join("particles_000001.vtu"))?;
-    let output = run("rebound.json", &first, &[&SMOOTHED, &["--restart"]])?;
-    let text = message(&output);
-    assert!(output.status.success() && text.contains("step 59, from"), "{text}");
-    assert!(
-        text.contains("snapshots of the run are not there any more") && text.contains("particles_000001.vtu"),
-        "{text}"
-    );
+    let text = done("rebound.json", &first, &[&SMOOTHED, &["--restart"]])?;
+    let words = ["step 59, from", "snapshots of the run are not there any more", "particles_000001.vtu"];
+    assert!(words.iter().all(|word| text.contains(word)), "{text}");
     // All other files equal those of an undisturbed run; pictures omit the snapshot.
     std::fs::remove_file(whole.join("particles_000001.vtu"))?;
     assert_same(&whole, &first)?;
-    let mut plot = Command::new(env!("CARGO_BIN_EXE_bfree"));
-    let output = plot.arg("plot").arg(&first).output()?;
-    assert!(output.status.success(), "{}", message(&output));
+    let (code, _, text) = said(Command::new(env!("CARGO_BIN_EXE_bfree")).arg("plot").arg(&first))?;
+    assert_eq!(code, Some(0), "{text}");
     Ok(())
 }
 
@@ -285,9 +250,8 @@ fn what_cannot_be_continued_is_refused_with_its_reason() -> Result<(), Failure> 
     let directory = folder.path().join("run");
     let refused = |arguments: &[&[&str]], words: &[&str]| -> Result<(), Failure> {
         let before = files(&directory).ok();
-        let output = run("rebound.json", &directory, arguments)?;
-        let text = message(&output);
-        assert_eq!(output.status.code(), Some(2), "{text}");
+        let (code, _, text) = run("rebound.json", &directory, arguments)?;
+        assert_eq!(code, Some(2), "{text}");
         assert!(words.iter().all(|word| text.contains(word)), "{words:?}: {text}");
         assert_eq!(files(&directory).ok(), before, "a refusal changes nothing");
         Ok(())
@@ -310,7 +274,7 @@ fn what_cannot_be_continued_is_refused_with_its_reason() -> Result<(), Failure> 
     }
     refused(&[&SMOOTHED, &["--restart"]], &["no checkpoint in", "checkpoint_0.bfree: it is no", "checkpoint_1.bfree"])?;
     // A new run in the same directory removes the old checkpoints, so that no restart continues from them.
-    assert!(run("rebound.json", &directory, &[&["--steps", "1", "--quiet", "--discard"]])?.status.success());
+    done("rebound.json", &directory, &[&["--steps", "1", "--quiet", "--discard"]])?;
     assert_eq!(checkpoints(&directory).len(), 0);
     Ok(())
 }
@@ -323,17 +287,17 @@ fn a_changed_particle_file_is_noticed() -> Result<(), Failure> {
         "bodies": [{"name": "a", "particles": {"file": "p.csv"}, "density": 1, "material": {"neo_hookean": {"bulk": 1, "shear": 1}}}],
         "output": {"checkpoint": 0.2}}"#;
     std::fs::write(&scene, text)?;
-    let run = |volume: f64, arguments: &[&str]| -> Result<Output, Failure> {
+    let run = |volume: f64, arguments: &[&str]| -> Result<(Option<i32>, String), Failure> {
         std::fs::write(folder.path().join("p.csv"), format!("x,y,volume\n2,2,{volume}\n2.5,2,0.1\n"))?;
         let mut program = Command::new(env!("CARGO_BIN_EXE_bfree"));
-        Ok(program.arg("run").arg(&scene).arg("--out").arg(&out).args(arguments).output()?)
+        let (code, _, text) = said(program.arg("run").arg(&scene).arg("--out").arg(&out).args(arguments))?;
+        Ok((code, text))
     };
-    let output = run(0.1, &["--steps", "3"])?;
-    assert!(output.status.success(), "{}", message(&output));
-    let output = run(0.2, &["--restart"])?;
-    assert!(message(&output).contains("other particles: volume differs"), "{}", message(&output));
-    let output = run(0.1, &["--restart"])?;
-    assert!(output.status.success(), "{}", message(&output));
+    assert_eq!(run(0.1, &["--steps", "3"])?.0, Some(0));
+    let (_, text) = run(0.2, &["--restart"])?;
+    assert!(text.contains("other particles: volume differs"), "{text}");
+    let (code, text) = run(0.1, &["--restart"])?;
+    assert_eq!(code, Some(0), "{text}");
     Ok(())
 }
 
@@ -345,21 +309,20 @@ fn a_full_disk_leaves_the_checkpoint_before() -> Result<(), Failure> {
     let (whole, full) = (folder.path().join("whole"), folder.path().join("full"));
     // Snapshots would be the first to meet the limit.
     let scene = [&SMOOTHED[..], &["--set", "output.every=100"]].concat();
-    assert!(run("rebound.json", &whole, &[&scene])?.status.success());
-    assert!(run("rebound.json", &full, &[&scene, &["--steps", "30"]])?.status.success());
+    done("rebound.json", &whole, &[&scene])?;
+    done("rebound.json", &full, &[&scene, &["--steps", "30"]])?;
     let length = std::fs::metadata(full.join("checkpoint_0.bfree"))?.len();
     let limited = program("rebound.json", &full, &[&scene[..], &["--restart"]].concat());
     let mut shell = Command::new("sh");
     // The limit is in blocks of 512 bytes; the tables are much shorter than a checkpoint at that time.
     let script = format!("trap '' XFSZ; ulimit -f {}; exec \"$0\" \"$@\"", length / 512 - 2);
     shell.args(["-c", &script]).arg(limited.get_program()).args(limited.get_args());
-    let output = shell.output()?;
-    let text = message(&output);
-    assert_eq!(output.status.code(), Some(1), "{text}");
+    let (code, _, text) = said(&mut shell)?;
+    assert_eq!(code, Some(1), "{text}");
     assert!(text.contains("no checkpoint could be written at t = 2") && text.contains("too large"), "{text}");
     assert!(text.contains("is whole: --restart continues from it"), "{text}");
-    let output = run("rebound.json", &full, &[&scene, &["--restart"]])?;
-    assert!(output.status.success() && message(&output).contains("step 30, from"), "{}", message(&output));
+    let text = done("rebound.json", &full, &[&scene, &["--restart"]])?;
+    assert!(text.contains("step 30, from"), "{text}");
     assert_same(&whole, &full)
 }
 
@@ -367,18 +330,17 @@ fn a_full_disk_leaves_the_checkpoint_before() -> Result<(), Failure> {
 fn a_run_that_could_be_continued_is_lost_on_request_only() -> Result<(), Failure> {
     let folder = tempfile::tempdir()?;
     let directory = folder.path().join("killed");
-    assert!(run("rebound.json", &directory, &[&SMOOTHED, &["--steps", "50"]])?.status.success());
+    done("rebound.json", &directory, &[&SMOOTHED, &["--steps", "50"]])?;
     // The run has ended, and `--discard` may delete it too. Without the report, it counts as a killed run.
-    assert!(run("rebound.json", &directory, &[&SMOOTHED, &["--steps", "60", "--discard"]])?.status.success());
+    done("rebound.json", &directory, &[&SMOOTHED, &["--steps", "60", "--discard"]])?;
     std::fs::remove_file(directory.join("report.json"))?;
     let kept: Vec<Vec<u8>> = checkpoints(&directory).iter().map(std::fs::read).collect::<Result<_, _>>()?;
-    let output = run("rebound.json", &directory, &[&SMOOTHED, &["--steps", "10"]])?;
-    let text = message(&output);
-    assert_eq!(output.status.code(), Some(2), "{text}");
+    let (code, _, text) = run("rebound.json", &directory, &[&SMOOTHED, &["--steps", "10"]])?;
+    assert_eq!(code, Some(2), "{text}");
     assert!(text.contains("after step 60") && text.contains("--restart") && text.contains("--discard"), "{text}");
     let now: Vec<Vec<u8>> = checkpoints(&directory).iter().map(std::fs::read).collect::<Result<_, _>>()?;
     assert!(now == kept && !kept.is_empty(), "nothing was touched");
-    assert!(run("rebound.json", &directory, &[&SMOOTHED, &["--steps", "10", "--discard"]])?.status.success());
+    done("rebound.json", &directory, &[&SMOOTHED, &["--steps", "10", "--discard"]])?;
     let steps = std::fs::read_to_string(directory.join("history.csv"))?.lines().count();
     assert_eq!(steps, 12, "a header, the start and ten steps");
     Ok(())

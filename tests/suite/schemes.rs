@@ -1,8 +1,7 @@
 //! Time schemes in whole steps: properties that each of them has.
 
-use crate::support::{Failure, scene};
+use crate::support::{Failure, advance, run_to, scene};
 use bfree::mechanics::schemes::{Alphas, Newmark, Scheme};
-use bfree::scene::{Override, read_file};
 use bfree::simulation::Simulation;
 use bfree::tensor::Vector;
 use std::fmt::{Display, Formatter};
@@ -12,10 +11,6 @@ const FALL: &[&str] = &["gravity={\"acceleration\":[0,-0.01]}", "time.beta=null"
 
 fn generalized(rho: f64) -> String {
     format!(r#"time.scheme={{"generalized_alpha":{{"spectral_radius":{rho}}}}}"#)
-}
-
-fn advance(simulation: &mut Simulation<2>, steps: usize) -> Result<(), Failure> {
-    (0..steps).try_for_each(|_| simulation.advance().map(drop)).map_err(Into::into)
 }
 
 /// Every scheme is exact for uniform acceleration: x = ½ g t², v = g t, without strain.
@@ -29,10 +24,9 @@ fn free_fall_is_exact_for_every_spectral_radius() -> Result<(), Failure> {
             let mut simulation = scene::<2>("rebound.json", &overrides)?;
             let (start, steps) = (simulation.particles.by_id(), 20);
             advance(&mut simulation, steps)?;
-            let (end, t) = (simulation.particles.by_id(), 0.05 * steps as f64);
+            let (end, t, g) = (simulation.particles.by_id(), 0.05 * steps as f64, Vector::from([0.0, -0.01]));
             for p in 0..end.len() {
-                let (fallen, g) =
-                    (end.position[p] - start.position[p] - start.velocity[p] * t, Vector::from([0.0, -0.01]));
+                let fallen = end.position[p] - start.position[p] - start.velocity[p] * t;
                 assert!((fallen - g * (0.5 * t * t)).norm() < 1e-9, "ρ = {rho}: {fallen}");
                 assert!((end.velocity[p] - start.velocity[p] - g * t).norm() < 1e-9, "ρ = {rho}");
             }
@@ -42,8 +36,7 @@ fn free_fall_is_exact_for_every_spectral_radius() -> Result<(), Failure> {
     Ok(())
 }
 
-/// Nodes with the prescribed motion of the body reach their target at the end of the step, not at the instant of the balance. So there is
-/// no strain.
+/// Nodes with the prescribed motion of the body reach their target at the end of the step, not at the instant of the balance.
 #[test]
 fn a_region_that_moves_with_the_body_strains_nothing() -> Result<(), Failure> {
     let region = r#"prescribed=[{"region":{"box":{"min":[0,0],"max":[15,2.6]}},"velocity":[[0,[0.5,0]]]}]"#;
@@ -91,9 +84,7 @@ fn it_damps_what_steps_do_not_resolve() -> Result<(), Failure> {
     let energies = |scheme: &str| -> Result<f64, Failure> {
         let mut simulation =
             scene::<2>("rebound.json", &["time.step=0.2", "time.beta=null", "time.gamma=null", scheme])?;
-        while simulation.clock.time() < 30.0 {
-            simulation.advance()?;
-        }
+        run_to(&mut simulation, 30.0)?;
         Ok(simulation.strain_energy() + simulation.particles.kinetic_energy())
     };
     let (none, some, all) = (energies(&generalized(1.0))?, energies(&generalized(0.5))?, energies(&generalized(0.0))?);
@@ -136,24 +127,6 @@ fn a_scheme_of_ones_own_runs_the_step() -> Result<(), Failure> {
     assert!((own.particles.kinetic_energy() / energy - 1.0).abs() < 1e-9);
     let (own, newmark) = (own.particles.by_id(), newmark.particles.by_id());
     assert!(own.position.iter().zip(&newmark.position).all(|(a, b)| (a - b).norm() < 1e-9));
-    Ok(())
-}
-
-/// The key `time.inertia` of an earlier version selects the scheme, with a note, unless `time.scheme` is given.
-#[test]
-fn the_old_key_of_the_scheme_is_read_with_a_note() -> Result<(), Failure> {
-    for (overrides, has_inertia) in [
-        (&[r#"time={"step":0.25,"end":1,"inertia":"none"}"#][..], false),
-        (&[r#"time={"step":0.25,"end":1,"scheme":"none","inertia":"newmark"}"#], false),
-        (&[r#"time={"step":0.25,"end":1,"inertia":"newmark"}"#], true),
-    ] {
-        let overrides: Result<Vec<Override>, _> = overrides.iter().map(|text| text.parse()).collect();
-        let scene = read_file("scenes/cook.json".as_ref(), &overrides?)?;
-        let simulation = scene.build::<2>("scenes".as_ref())?;
-        assert_eq!(simulation.settings.scheme.has_inertia(), has_inertia);
-        let warnings = scene.warnings(&simulation);
-        assert!(warnings.iter().any(|text| text.contains("time.inertia is now called time.scheme")), "{warnings:?}");
-    }
     Ok(())
 }
 

@@ -1,12 +1,11 @@
 //! Shapes as drawn, against slow and simple geometry; and the messages for shapes that are drawn wrong.
 
-use crate::support::{Failure, built};
-use bfree::scene::{self, SceneError};
+use crate::support::{Failure, assert_refused, built, cases};
 use bfree::shape::{Ball, Block, Cone, Polygon, PolygonError, Shape, Similar, rotation};
 use bfree::tensor::Vector;
 use proptest::prelude::*;
 use serde_json::{Value, json};
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 type Point<const D: usize> = Vector<f64, D>;
 
@@ -120,8 +119,7 @@ proptest! {
             prop_assert!(d.abs() <= nearest + 1e-14 && nearest <= d.abs() + 0.01, "{d} {nearest}");
             foot_and_normal(&shape, x)?;
         }
-        // The parts in all cells sum to the whole polygon: area and first moment by the trapezia under its edges, and the length of its
-        // outline.
+        // The parts in all cells sum to the polygon: area and first moment by the trapezia under its edges, and its circumference.
         let (area, moment) = vertices.iter().zip(vertices.iter().cycle().skip(1)).fold((0.0, Vector::zeros()), |(area, moment), (a, b)| {
             let twice = a[0] * b[1] - a[1] * b[0];
             (area + 0.5 * twice, moment + (a + b) * (twice / 6.0))
@@ -256,22 +254,20 @@ fn with_shape(dimension: usize, shape: &Value) -> Value {
 
 #[test]
 fn bodies_have_the_volume_of_what_is_drawn() -> Result<(), Failure> {
-    let volume = |particles: &[f64]| particles.iter().sum::<f64>();
     let drawn = json!({"polygon": [[1, 1], [3, 1], [3, 3], [2, 2], [1, 3]]});
-    let plane = |shape: &Value| Ok::<_, Failure>(volume(&built::<2>(&with_shape(2, shape))?.particles.volume));
-    assert!((plane(&drawn)? - 3.0).abs() < 1e-9);
     let half = json!({"scaled": {"of": drawn, "about": [1, 1], "factor": 0.5}});
-    assert!((plane(&half)? - 0.75).abs() < 1e-9);
     let turned = json!({"rotated": {"of": drawn, "about": [2, 2], "angle": 33}});
-    assert!((plane(&turned)? - 3.0).abs() < 1e-9);
-    let space = |shape: &Value| Ok::<_, Failure>(volume(&built::<3>(&with_shape(3, shape))?.particles.volume));
+    for (shape, exact) in [(drawn, 3.0), (half, 0.75), (turned, 3.0)] {
+        let volume: f64 = built::<2>(&with_shape(2, &shape))?.particles.volume.iter().sum();
+        assert!((volume - exact).abs() < 1e-9, "{shape}: {volume}");
+    }
     let cylinder = json!({"cylinder": {"from": [2, 2, 0.5], "to": [2, 2, 3.5], "radius": 1}});
-    let exact = 3.0 * std::f64::consts::PI;
-    assert!((space(&cylinder)? / exact - 1.0).abs() < 1e-3);
     let lying = json!({"rotated": {"of": cylinder, "about": [2, 2, 2], "angle": 90, "axis": [1, 0, 0]}});
-    assert!((space(&lying)? / exact - 1.0).abs() < 1e-3);
     let cone = json!({"cone": {"from": [0.5, 2, 2], "to": [3.5, 2, 2], "radii": [1, 0]}});
-    assert!((space(&cone)? / exact * 3.0 - 1.0).abs() < 1e-3);
+    for (shape, exact) in [(cylinder, 3.0 * PI), (lying, 3.0 * PI), (cone, PI)] {
+        let volume: f64 = built::<3>(&with_shape(3, &shape))?.particles.volume.iter().sum();
+        assert!((volume / exact - 1.0).abs() < 1e-3, "{shape}: {volume}");
+    }
     Ok(())
 }
 
@@ -295,102 +291,38 @@ fn a_region_that_ends_on_nodes_holds_them_whatever_the_round_off() -> Result<(),
     Ok(())
 }
 
-/// (dimension, shape, key below the shape, words)
-const WRONG: &[(usize, &str, &str, &[&str])] = &[
-    (2, r#"{"polygon": []}"#, "polygon", &["0 vertices", "at least 3"]),
-    (2, r#"{"polygon": [[1, 1], [2, 2]]}"#, "polygon", &["2 vertices", "at least 3"]),
-    (2, r#"{"polygon": [[1, 1], [2, 1], [2, 1]]}"#, "polygon[2]", &["vertex 2 at the place of vertex 1"]),
-    (2, r#"{"polygon": [[1, 1], [2, 2], [3, 3]]}"#, "polygon", &["without area", "not all on a line"]),
-    (
-        2,
-        r#"{"polygon": [[1, 1], [3, 1], [1, 2], [3, 2]]}"#,
-        "polygon[3]",
-        &["vertices 3 and 0", "between 1 and 2", "counted from 0"],
-    ),
-    (2, r#"{"polygon": [[1, 1], [3, 1, 1], [1, 2]]}"#, "polygon[1]", &["length 3", "2 components"]),
-    (2, r#"{"polygon": [[1, 1], [5, 1], [1, 2]]}"#, "", &["x = 1 to 5", "must lie in the grid"]),
-    (3, r#"{"polygon": [[1, 1], [3, 1], [1, 2]]}"#, "polygon", &["2 dimensions", "has 3"]),
-    (3, r#"{"cylinder": {"from": [1, 1, 1], "to": [1, 1, 1], "radius": 1}}"#, "cylinder.to", &["differ", "axis"]),
-    (3, r#"{"cylinder": {"from": [2, 2, 1], "to": [2, 2, 3], "radius": 0}}"#, "cylinder.radius", &["0 is not", "> 0"]),
-    (
-        3,
-        r#"{"cone": {"from": [2, 2, 1], "to": [2, 2, 3], "radii": [-1, 0]}}"#,
-        "cone.radii[0]",
-        &["-1 is not", "between 0"],
-    ),
-    (
-        3,
-        r#"{"cone": {"from": [2, 2, 1], "to": [2, 2, 3], "radii": [0, 0]}}"#,
-        "cone.radii",
-        &["[0, 0]", "one of the two"],
-    ),
-    (1, r#"{"cylinder": {"from": [1], "to": [2], "radius": 1}}"#, "cylinder", &["use a box"]),
-    (
-        2,
-        r#"{"rotated": {"of": {"ball": {"center": [2, 2], "radius": 1}}, "about": [2], "angle": 1}}"#,
-        "rotated.about",
-        &["2 components"],
-    ),
-    (
-        2,
-        r#"{"rotated": {"of": {"ball": {"center": [2, 2], "radius": 1}}, "about": [2, 2], "angle": 1e200}}"#,
-        "rotated.angle",
-        &["1e200", "at most"],
-    ),
-    (
-        2,
-        r#"{"rotated": {"of": {"ball": {"center": [2, 2], "radius": 1}}, "about": [2, 2], "angle": 1, "axis": [0, 0]}}"#,
-        "rotated.axis",
-        &["remove it"],
-    ),
-    (
-        3,
-        r#"{"rotated": {"of": {"ball": {"center": [2, 2, 2], "radius": 1}}, "about": [2, 2, 2], "angle": 1}}"#,
-        "rotated",
-        &["give its \"axis\""],
-    ),
-    (
-        3,
-        r#"{"rotated": {"of": {"ball": {"center": [2, 2, 2], "radius": 1}}, "about": [2, 2, 2], "angle": 1, "axis": [0, 0, 0]}}"#,
-        "rotated.axis",
-        &["zero vector"],
-    ),
-    (
-        1,
-        r#"{"rotated": {"of": {"ball": {"center": [2], "radius": 1}}, "about": [2], "angle": 1}}"#,
-        "rotated",
-        &["a line"],
-    ),
-    (
-        2,
-        r#"{"scaled": {"of": {"ball": {"center": [2, 2], "radius": 1}}, "about": [2, 2], "factor": 0}}"#,
-        "scaled.factor",
-        &["0 is not", "> 0"],
-    ),
-    (
-        2,
-        r#"{"scaled": {"of": {"box": {"min": [1, 1.5], "max": [3, 2.5]}}, "about": [2, 2], "factor": 3}}"#,
-        "",
-        &["x = -1 to 5", "must lie in the grid"],
-    ),
-    (
-        2,
-        r#"{"scaled": {"of": {"polygon": [[0, 0]]}, "about": [2, 2], "factor": 1}}"#,
-        "scaled.of.polygon",
-        &["1 vertices"],
-    ),
-];
+/// Dimension | shape | key below the shape | words of the message.
+const WRONG: &str = r##"
+2 | {"polygon": []} | polygon | 0 vertices | at least 3
+2 | {"polygon": [[1, 1], [2, 2]]} | polygon | 2 vertices | at least 3
+2 | {"polygon": [[1, 1], [2, 1], [2, 1]]} | polygon[2] | vertex 2 at the place of vertex 1
+2 | {"polygon": [[1, 1], [2, 2], [3, 3]]} | polygon | without area | not all on a line
+2 | {"polygon": [[1, 1], [3, 1], [1, 2], [3, 2]]} | polygon[3] | vertices 3 and 0 | between 1 and 2 | counted from 0
+2 | {"polygon": [[1, 1], [3, 1, 1], [1, 2]]} | polygon[1] | length 3 | 2 components
+2 | {"polygon": [[1, 1], [5, 1], [1, 2]]} |  | x = 1 to 5 | must lie in the grid
+3 | {"polygon": [[1, 1], [3, 1], [1, 2]]} | polygon | 2 dimensions | has 3
+3 | {"cylinder": {"from": [1, 1, 1], "to": [1, 1, 1], "radius": 1}} | cylinder.to | differ | axis
+3 | {"cylinder": {"from": [2, 2, 1], "to": [2, 2, 3], "radius": 0}} | cylinder.radius | 0 is not | > 0
+3 | {"cone": {"from": [2, 2, 1], "to": [2, 2, 3], "radii": [-1, 0]}} | cone.radii[0] | -1 is not | between 0
+3 | {"cone": {"from": [2, 2, 1], "to": [2, 2, 3], "radii": [0, 0]}} | cone.radii | [0, 0] | one of the two
+1 | {"cylinder": {"from": [1], "to": [2], "radius": 1}} | cylinder | use a box
+2 | {"rotated": {"of": {"ball": {"center": [2, 2], "radius": 1}}, "about": [2], "angle": 1}} | rotated.about | 2 components
+2 | {"rotated": {"of": {"ball": {"center": [2, 2], "radius": 1}}, "about": [2, 2], "angle": 1e200}} | rotated.angle | 1e200 | at most
+2 | {"rotated": {"of": {"ball": {"center": [2, 2], "radius": 1}}, "about": [2, 2], "angle": 1, "axis": [0, 0]}} | rotated.axis | remove it
+3 | {"rotated": {"of": {"ball": {"center": [2, 2, 2], "radius": 1}}, "about": [2, 2, 2], "angle": 1}} | rotated | give its "axis"
+3 | {"rotated": {"of": {"ball": {"center": [2, 2, 2], "radius": 1}}, "about": [2, 2, 2], "angle": 1, "axis": [0, 0, 0]}} | rotated.axis | zero vector
+1 | {"rotated": {"of": {"ball": {"center": [2], "radius": 1}}, "about": [2], "angle": 1}} | rotated | a line
+2 | {"scaled": {"of": {"ball": {"center": [2, 2], "radius": 1}}, "about": [2, 2], "factor": 0}} | scaled.factor | 0 is not | > 0
+2 | {"scaled": {"of": {"box": {"min": [1, 1.5], "max": [3, 2.5]}}, "about": [2, 2], "factor": 3}} |  | x = -1 to 5 | must lie in the grid
+2 | {"scaled": {"of": {"polygon": [[0, 0]]}, "about": [2, 2], "factor": 1}} | scaled.of.polygon | 1 vertices
+"##;
 
 #[test]
 fn wrong_drawings_are_named_with_what_is_allowed() {
-    for (dimension, shape, key, words) in WRONG {
-        let drawn: Value = serde_json::from_str(shape).unwrap();
-        let text = serde_json::to_string_pretty(&with_shape(*dimension, &drawn)).unwrap();
-        let error = scene::read(&text, &[]).expect_err(&text);
-        let SceneError::Values(problems) = &error else { panic!("{shape}: {error}") };
-        assert_eq!(problems.list.len(), 1, "{shape}:\n{error}");
-        let (path, message) = (&problems.list[0].path, problems.list[0].to_string());
-        assert_eq!(*path, format!("bodies[0].shape{}{key}", if key.is_empty() { "" } else { "." }), "{error}");
-        assert!(problems.list[0].place.is_some() && words.iter().all(|word| message.contains(word)), "{message}");
+    for case in cases(WRONG) {
+        let drawn: Value = serde_json::from_str(case[1]).unwrap();
+        let text = serde_json::to_string_pretty(&with_shape(case[0].parse().unwrap(), &drawn)).unwrap();
+        let below = if case[2].is_empty() { "" } else { "." };
+        assert_refused(&text, &format!("bodies[0].shape{below}{}", case[2]), &case[3..]);
     }
 }

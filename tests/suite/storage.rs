@@ -13,11 +13,7 @@ const LOADED: [&str; 2] = [
 
 fn shuffled<const D: usize>(simulation: &Simulation<D>) -> Simulation<D> {
     let (mut random, mut other) = (Random(5), simulation.clone());
-    let mut order: Vec<u32> = (0..other.particles.len() as u32).collect();
-    for last in (1..order.len()).rev() {
-        order.swap(last, random.below(last as u64 + 1) as usize);
-    }
-    other.rearrange(&order);
+    other.rearrange(&random.order(simulation.particles.len()));
     assert_ne!(other.particles.id, simulation.particles.id);
     other
 }
@@ -71,8 +67,7 @@ fn a_checkpoint_knows_where_the_particles_lie() -> Result<(), Failure> {
     Ok(())
 }
 
-/// Two numbers for a block of `cells`³ cells under its weight: the bytes that it holds in a step, and the bytes that its thread allocates
-/// in a step. The second is the least of some steps, since other tests may have taken the memory left for this one.
+/// The bytes that a block of `cells`³ cells under its weight holds in a step, and the least that its thread allocates in one of some steps.
 fn held_and_allocated(cells: u32, method: &str) -> Result<[f64; 2], Failure> {
     let side = f64::from(cells) * 0.1;
     let overrides = [

@@ -2,7 +2,7 @@
 
 mod stored;
 
-use crate::support::{Failure, closed_laws};
+use crate::support::{Failure, Watched, body, closed_laws, difference, in_threads, irregular};
 use bfree::approximation::{Approximation, Linear, Lme, ShapeFunction};
 use bfree::grid::Grid;
 use bfree::material::{ClosedTangent, Lame, Law, Material, MaterialState, NeoHookean};
@@ -21,13 +21,13 @@ use bfree::tensor::{Tensor, Vector, identity};
 use num_dual::Dual64;
 use std::convert::Infallible;
 
-/// Numbers without pattern in (−1, 1): the golden-ratio sequence.
-struct Irregular(u32);
+/// Irregular numbers, one after the other.
+struct Irregular(usize);
 
 impl Irregular {
     fn number(&mut self) -> f64 {
         self.0 += 1;
-        2.0 * (f64::from(self.0) * 0.618_033_988_749_894_9).fract() - 1.0
+        irregular(self.0 - 1)
     }
 
     fn vector<const D: usize>(&mut self) -> Vector<f64, D> {
@@ -138,33 +138,11 @@ fn scalars_and_weights<const D: usize>(fast: &Supports<D>, plain: &Supports<D>, 
     }
     let (of_one, of_all) = (fast.values(&first), fast.values(u));
     assert!(of_one.iter().zip(&of_all).all(|(one, all)| (one[0] - all[0]).abs() < 1e-14), "{case}: values");
-    let mut expected = vec![Vector::from([0.0]); u.len()];
-    for p in 0..plain.particles() {
-        plain.of(p).for_each(|(node, n, _)| expected[node] += value(p) * n);
-    }
-    for supports in [fast, plain] {
-        let (mut one, mut all) = (vec![Vector::from([0.0]); u.len()], vec![Vector::<f64, D>::zeros(); u.len()]);
-        supports.spread(&mut one, value);
-        supports.spread(&mut all, |p| Vector::from_fn(|k, _| value(p)[0] * (k as f64 - 0.5)));
-        let worst = difference(&one, &expected);
-        assert!(worst < 1e-12, "{case}: spread {worst:e}");
-        let in_turn: Vec<Vector<f64, D>> =
-            expected.iter().map(|x| Vector::from_fn(|k, _| x[0] * (k as f64 - 0.5))).collect();
-        let worst = difference(&all, &in_turn);
-        assert!(worst < 1e-12, "{case}: vectors spread {worst:e}");
-    }
 }
 
 fn field<const D: usize>(nodes: &Nodes) -> Vec<Vector<f64, D>> {
     let mut random = Irregular(1000);
     (0..nodes.len()).map(|_| random.vector()).collect()
-}
-
-/// Largest difference over largest value.
-fn difference<const D: usize>(a: &[Vector<f64, D>], b: &[Vector<f64, D>]) -> f64 {
-    assert_eq!(a.len(), b.len());
-    let largest = b.iter().map(|x| x.amax()).fold(0.0, f64::max);
-    a.iter().zip(b).map(|(a, b)| (a - b).amax()).fold(0.0, |worst, d| if d <= worst { worst } else { d }) / largest
 }
 
 fn compare<const D: usize>() {
@@ -238,7 +216,7 @@ fn one_a_cell<const D: usize>(cells: [u32; D]) -> Result<(Grid<D>, Particles<D>,
         particles.push(x + random.vector() * 0.3, random.vector(), 1.0, 1.0 + 0.5 * random.number(), 0);
     }
     let law = Material::from(NeoHookean::ciarlet(Lame::new(2.0, 1.0)?));
-    Ok((grid, particles, [Body { name: "body".into(), law, density: 1.0, dilatation: Default::default() }]))
+    Ok((grid, particles, [body(law)]))
 }
 
 /// The results of a step that are sums over blocks.
@@ -277,13 +255,11 @@ fn computed<const D: usize>(
 fn several_waves<const D: usize>(cells: [u32; D]) -> Result<(), Failure> {
     let (grid, particles, bodies) = one_a_cell(cells)?;
     let (shape, at) = (Approximation::from(Linear), &particles.position);
-    let in_waves = |threads: usize| -> Result<_, Failure> {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
-        pool.install(|| {
-            let (supports, nodes) = Supports::new(&shape, &grid, at).map_err(|error| error.to_string())?;
-            computed(&supports, &nodes, &particles, &bodies).map_err(|error| error.to_string())
+    let in_waves = |threads: usize| {
+        in_threads(threads, || {
+            let (supports, nodes) = Supports::new(&shape, &grid, at)?;
+            computed(&supports, &nodes, &particles, &bodies)
         })
-        .map_err(Failure::from)
     };
     let one = in_waves(1)?;
     let (plain, nodes) = Supports::plain(&shape, &grid, at)?;

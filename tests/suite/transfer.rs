@@ -1,6 +1,6 @@
 //! Particle-to-grid transfer: the equation of the projection, and nodes whose mass is too small for it.
 
-use crate::support::Failure;
+use crate::support::{Failure, irregular};
 use bfree::approximation::{Approximation, Bspline, Linear, Lme};
 use bfree::grid::Grid;
 use bfree::mechanics::sweep::Supports;
@@ -9,12 +9,11 @@ use bfree::particles::Particles;
 use bfree::tensor::Vector;
 
 fn cloud(velocity: f64, acceleration: f64) -> Particles<2> {
-    let number = |k: usize| 2.0 * ((k + 1) as f64 * 0.618_033_988_749_894_9).fract() - 1.0;
     let mut particles = Particles::default();
     for p in 0..80 {
-        let vector = |from: usize, size: f64| Vector::from_fn(|k, _| size * number(17 * p + from + k));
+        let vector = |from: usize, size: f64| Vector::from_fn(|k, _| size * irregular(17 * p + from + k));
         let position = Vector::repeat(2.5) + vector(0, 2.0);
-        particles.push(position, vector(2, velocity), 0.1, 0.2 + 0.1 * number(17 * p + 4), 0);
+        particles.push(position, vector(2, velocity), 0.1, 0.2 + 0.1 * irregular(17 * p + 4), 0);
         particles.acceleration[p] = vector(5, acceleration);
     }
     particles
@@ -91,23 +90,17 @@ fn only_a_node_of_next_to_no_mass_gets_no_velocity_in_any_unit_of_mass() -> Resu
     Ok(())
 }
 
+/// 1e-300 off a wall, the products of the other nodes' functions have no finite inverse. The study `extremes` has masses lumped in part.
 #[test]
 fn nodes_with_the_least_mass_there_is_leave_the_projection_finite() -> Result<(), Failure> {
-    // 1e-300 off a wall: the products of the other nodes' functions have no finite inverse.
+    let velocity = Vector::from([0.0, 0.3, -0.2]);
     let mut particles = Particles::<3>::default();
-    particles.push(Vector::from([1e-300, 1.5, 1.5]), Vector::from([0.0, 0.3, -0.2]), 0.125, 1.0, 0);
-    particles.acceleration[0] = Vector::from([0.0, -2.0, 1.0]);
+    particles.push(Vector::from([1e-300, 1.5, 1.5]), velocity, 0.125, 1.0, 0);
     let grid = Grid { origin: Vector::zeros(), spacing: 0.5, cells: [6; 3] };
-    for lumping in [1.0, 0.5, 0.0] {
-        let (supports, _) = Supports::new(&Approximation::from(Lme::new(3.0, 1e-6)), &grid, &particles.position)?;
-        let nodal = Nodal::project(&particles, &supports, lumping)?;
-        for (projected, field) in
-            [(&nodal.velocity, &particles.velocity), (&nodal.acceleration, &particles.acceleration)]
-        {
-            let back: Vector<f64, 3> = supports.of(0).map(|(node, n, _)| projected[node] * n).sum();
-            assert!((back - field[0]).norm() < 1e-11, "ε = {lumping}: {back:?}");
-        }
-    }
+    let (supports, _) = Supports::new(&Approximation::from(Lme::new(3.0, 1e-6)), &grid, &particles.position)?;
+    let nodal = Nodal::project(&particles, &supports, 0.0)?;
+    let back: Vector<f64, 3> = supports.of(0).map(|(node, n, _)| nodal.velocity[node] * n).sum();
+    assert!((back - velocity).norm() < 1e-11, "{back:?}");
     Ok(())
 }
 

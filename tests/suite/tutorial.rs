@@ -1,8 +1,7 @@
-//! The tutorials, as a reader does them: the commands of all pages, one after the other, in one folder that is empty at first. The results
-//! must equal the numbers on the pages.
+//! The tutorials, as a reader does them: the commands of all pages in one folder. The results must equal the numbers on the pages.
 
 use crate::manual::{Page, in_repository};
-use crate::support::Failure;
+use crate::support::{Failure, said};
 use std::path::Path;
 use std::process::Command;
 
@@ -12,52 +11,19 @@ const ROUNDED: f64 = 1e-3;
 /// Runs every block of commands of a page in `folder`, with the program on the shell's path.
 fn follow(page: &Page, folder: &Path) -> Result<(), Failure> {
     let program = Path::new(env!("CARGO_BIN_EXE_bfree")).parent().ok_or("no folder")?;
-    let path = std::env::join_paths(
-        std::iter::once(program.to_owned()).chain(std::env::split_paths(&std::env::var_os("PATH").unwrap_or_default())),
-    )?;
+    let others = std::env::var_os("PATH").unwrap_or_default();
+    let path = std::env::join_paths(std::iter::once(program.to_owned()).chain(std::env::split_paths(&others)))?;
     for (_, commands) in page.blocks.iter().filter(|(kind, _)| kind == "sh") {
-        let output = Command::new("bash")
-            .args(["-euo", "pipefail", "-c", commands])
-            .env("PATH", &path)
-            .current_dir(folder)
-            .output()?;
-        assert!(output.status.success(), "{commands}: {}", String::from_utf8_lossy(&output.stderr));
+        let mut bash = Command::new("bash");
+        bash.args(["-euo", "pipefail", "-c", commands]).env("PATH", &path).current_dir(folder);
+        let (code, _, text) = said(&mut bash)?;
+        assert_eq!(code, Some(0), "{commands}: {text}");
     }
     Ok(())
 }
 
-/// A row of the table of a tutorial: `` | `FILE`: `COLUMN` | time | known | bfree | error | ``.
-struct Claim {
-    file: String,
-    column: String,
-    time: f64,
-    known: f64,
-    found: f64,
-    error: f64,
-}
-
 fn number(text: &str) -> Result<f64, Failure> {
     Ok(text.replace('−', "-").parse().map_err(|error| format!("`{text}`: {error}"))?)
-}
-
-fn claims(text: &str) -> Result<Vec<Claim>, Failure> {
-    let mut claims = Vec::new();
-    for line in text.lines().filter(|line| line.starts_with("| `out/")) {
-        let cells: Vec<&str> = line.trim_matches('|').split('|').map(str::trim).collect();
-        let [place, time, known, found, error] = cells[..] else { return Err(line.into()) };
-        let (file, column) = place.split_once(": ").ok_or(line)?;
-        let unquoted = |code: &str| code.trim_matches('`').to_owned();
-        let error = number(error.strip_suffix(" %").ok_or(line)?)? / 100.0;
-        claims.push(Claim {
-            file: unquoted(file),
-            column: unquoted(column),
-            time: number(time)?,
-            known: number(known)?,
-            found: number(found)?,
-            error,
-        });
-    }
-    Ok(claims)
 }
 
 /// The value of a column of a table of results at a time.
@@ -75,11 +41,16 @@ fn value(table: &str, column: &str, time: f64) -> Option<f64> {
 fn tutorial<const ROWS: usize>(name: &str, folder: &Path) -> Result<[f64; ROWS], Failure> {
     let file = in_repository(&format!("docs/src/tutorial/{name}.md"));
     follow(&Page::read(&file)?, folder)?;
-    let claims = claims(&std::fs::read_to_string(&file)?)?;
     let mut values = Vec::new();
-    for Claim { file, column, time, known, found, error } in claims {
-        let table = std::fs::read_to_string(folder.join(&file))?;
-        let came_out = value(&table, &column, time).ok_or_else(|| format!("{file}: no {column} at {time}"))?;
+    // A row of the table: | `FILE`: `COLUMN` | time | known | bfree | error |
+    for line in std::fs::read_to_string(&file)?.lines().filter(|line| line.starts_with("| `out/")) {
+        let cells: Vec<&str> = line.trim_matches('|').split('|').map(str::trim).collect();
+        let [place, time, known, found, error] = cells[..] else { return Err(line.into()) };
+        let (file, column) = place.trim_matches('`').split_once("`: `").ok_or(line)?;
+        let (time, known, found) = (number(time)?, number(known)?, number(found)?);
+        let error = number(error.strip_suffix(" %").ok_or(line)?)? / 100.0;
+        let table = std::fs::read_to_string(folder.join(file))?;
+        let came_out = value(&table, column, time).ok_or_else(|| format!("{file}: no {column} at {time}"))?;
         let what = format!("{file}, {column} at t = {time}: {came_out}; {known} is known, the text says {found}");
         assert!((came_out - found).abs() <= ROUNDED * known.abs(), "{what}");
         assert!((came_out - known).abs() <= error * known.abs(), "{what}, within {error}");
@@ -156,8 +127,8 @@ fn the_readme_s_scene_runs() -> Result<(), Failure> {
     let (_, scene) = page.blocks.iter().find(|(kind, _)| kind == "json").ok_or("no scene")?;
     std::fs::write(folder.path().join("drop.json"), scene)?;
     let mut run = Command::new(env!("CARGO_BIN_EXE_bfree"));
-    let output = run.args(["run", "drop.json", "--quiet"]).current_dir(&folder).output()?;
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let (code, _, text) = said(run.args(["run", "drop.json", "--quiet"]).current_dir(&folder))?;
+    assert_eq!(code, Some(0), "{text}");
     assert!(folder.path().join("out/drop/history.csv").exists());
     Ok(())
 }

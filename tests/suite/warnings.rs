@@ -1,6 +1,6 @@
 //! The warnings of `bfree check` and of the start of a run, with numbers.
 
-use crate::support::Failure;
+use crate::support::{self, Failure, merged, shipped, solid};
 use bfree::mechanics::reference::GridReset;
 use bfree::scene;
 use serde_json::{Value, json};
@@ -8,19 +8,15 @@ use std::path::Path;
 
 /// The warnings about a 2D scene with these bodies. Its functions are linear, and its grid has 8 × 8 cells of 1.
 fn warnings(bodies: Value, more: Value, folder: &Path) -> Result<Vec<String>, Failure> {
-    let mut text = json!({
+    let text = json!({
         "grid": {"size": [8, 8], "spacing": 1}, "time": {"step": 0.1, "end": 1}, "approximation": "linear", "bodies": bodies
     });
-    if let (Some(scene), Value::Object(more)) = (text.as_object_mut(), more) {
-        scene.extend(more);
-    }
-    let scene = scene::read(&text.to_string(), &[])?;
+    let scene = scene::read(&merged(text, more).to_string(), &[])?;
     Ok(scene.warnings(&scene.build::<2>(folder)?))
 }
 
 fn block(name: &str, min: [f64; 2], max: [f64; 2]) -> Value {
-    json!({"name": name, "shape": {"box": {"min": min, "max": max}}, "density": 1,
-           "material": {"neo_hookean": {"young": 100, "poisson": 0.3}}})
+    solid(name, 100, json!({"box": {"min": min, "max": max}}))
 }
 
 fn file(name: &str, file: &str) -> Value {
@@ -45,10 +41,7 @@ fn bodies_that_overlap_are_named_with_particles_and_volume() -> Result<(), Failu
     // The bodies lie side by side.
     assert_eq!(warnings(bodies(4.0), json!({}), nowhere)?, Vec::<String>::new());
     // Round bodies that touch in a point.
-    let ball = |name: &str, x: f64| {
-        json!({"name": name, "shape": {"ball": {"center": [x, 4.1], "radius": 1.3}}, "density": 1,
-               "material": {"neo_hookean": {"young": 100, "poisson": 0.3}}})
-    };
+    let ball = |name: &str, x: f64| solid(name, 100, json!({"ball": {"center": [x, 4.1], "radius": 1.3}}));
     assert_eq!(warnings(json!([ball("a", 2.0), ball("b", 4.6)]), json!({}), nowhere)?, Vec::<String>::new());
     Ok(())
 }
@@ -77,8 +70,7 @@ fn a_body_of_less_than_two_cells_is_named_with_its_thickness() -> Result<(), Fai
     assert_eq!(thick(2.0)?, Vec::<String>::new());
     // The warning names the thickness of the ring's wall, not the diameter of the ring.
     let disc = |radius: f64| json!({"ball": {"center": [4, 4], "radius": radius}});
-    let ring = json!([{"name": "ring", "shape": {"difference": {"of": disc(3.5), "minus": disc(2.7)}}, "density": 1,
-                       "material": {"neo_hookean": {"young": 100, "poisson": 0.3}}}]);
+    let ring = json!([solid("ring", 100, json!({"difference": {"of": disc(3.5), "minus": disc(2.7)}}))]);
     assert_one(&warnings(ring, json!({}), nowhere)?, &["\"ring\" is about", "cells"]);
     let folder = tempfile::tempdir()?;
     std::fs::write(folder.path().join("p.csv"), "x,y,volume\n1.25,1.25,0.25\n1.75,1.25,0.25\n2.25,1.25,0.25\n")?;
@@ -92,8 +84,8 @@ fn a_body_of_less_than_two_cells_is_named_with_its_thickness() -> Result<(), Fai
 #[test]
 fn a_mass_that_misses_the_shape_by_a_percent_is_said() -> Result<(), Failure> {
     let nowhere = Path::new(".");
-    let mut disc = json!({"name": "disc", "shape": {"ball": {"center": [4, 4], "radius": 2.2}}, "density": 1, "fill": "cells",
-                          "material": {"neo_hookean": {"young": 100, "poisson": 0.3}}});
+    let mut disc = solid("disc", 100, json!({"ball": {"center": [4, 4], "radius": 2.2}}));
+    disc["fill"] = "cells".into();
     // The centres of 16 cells lie in the circle, whose area is 15.2.
     assert_one(
         &warnings(json!([disc]), json!({}), nowhere)?,
@@ -127,12 +119,8 @@ fn a_prescribed_region_between_nodes_is_named() -> Result<(), Failure> {
 fn a_body_that_locks_is_named_with_its_number_and_its_cure() -> Result<(), Failure> {
     let nowhere = Path::new(".");
     let of = |material: Value, more: Value| {
-        let mut body =
-            json!({"name": "a", "shape": {"box": {"min": [1, 1], "max": [4, 4]}}, "density": 1, "material": material});
-        if let (Some(body), Value::Object(more)) = (body.as_object_mut(), more) {
-            body.extend(more);
-        }
-        warnings(json!([body]), json!({}), nowhere)
+        let body = merged(block("a", [1.0, 1.0], [4.0, 4.0]), json!({"material": material}));
+        warnings(json!([merged(body, more)]), json!({}), nowhere)
     };
     let rubber = |poisson: f64| json!({"neo_hookean": {"young": 100, "poisson": poisson}});
     let mean = json!({"volumetric": "mean_dilatation"});
@@ -156,6 +144,7 @@ fn deprecated_keys_are_read_and_named() -> Result<(), Failure> {
     let body = || json!([block("a", [1.0, 1.0], [4.0, 4.0])]);
     let grid = json!({"size": [8, 8], "spacing": 1, "renewed": "never"});
     for (key, given, cure) in [
+        ("ghost_stiffness", json!({"ghost_stiffness": 0.001}), "aggregation"),
         ("solver.krylov.precision", json!({"solver": {"krylov": {"precision": "double"}}}), "Remove the key"),
         ("solver.krylov.precision", json!({"solver": {"krylov": {"precision": "mixed"}}}), "Remove the key"),
         ("time.inertia", json!({"time": {"step": 0.1, "end": 1, "inertia": "newmark"}}), "time.scheme"),
@@ -166,20 +155,25 @@ fn deprecated_keys_are_read_and_named() -> Result<(), Failure> {
         assert_one(&found, &[key, cure]);
     }
     assert_eq!(warnings(body(), json!({}), Path::new("."))?, Vec::<String>::new());
-    let asked = ["grid.renewed=\"never\"".parse()?];
-    let simulation = scene::read_file("scenes/rebound.json".as_ref(), &asked)?.build::<2>("scenes".as_ref())?;
-    assert_eq!(simulation.settings.grid_reset, GridReset::Never);
+    assert_eq!(
+        support::scene::<2>("rebound.json", &[r#"grid.renewed="never""#])?.settings.grid_reset,
+        GridReset::Never
+    );
+    // `time.inertia` selects the scheme, unless `time.scheme` is given.
+    for (inertia, has_inertia) in
+        [(r#""none""#, false), (r#""newmark","scheme":"none""#, false), (r#""newmark""#, true)]
+    {
+        let time = format!(r#"time={{"step":0.25,"end":1,"inertia":{inertia}}}"#);
+        assert_eq!(support::scene::<2>("cook.json", &[&time])?.settings.scheme.has_inertia(), has_inertia, "{time}");
+    }
     Ok(())
 }
 
 #[test]
-fn shipped_scenes_have_nothing_to_warn_of() -> Result<(), Failure> {
+fn shipped_scenes_are_sound_and_have_nothing_to_warn_of() -> Result<(), Failure> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
-    for entry in std::fs::read_dir(&folder)? {
-        let path = entry?.path();
-        if path.extension().is_none_or(|ending| ending != "json") {
-            continue;
-        }
+    let mut names = Vec::new();
+    for path in shipped()? {
         let scene = scene::read_file(&path, &[])?;
         let found = match scene.dimension() {
             1 => scene.warnings(&scene.build::<1>(&folder)?),
@@ -187,6 +181,13 @@ fn shipped_scenes_have_nothing_to_warn_of() -> Result<(), Failure> {
             _ => scene.warnings(&scene.build::<3>(&folder)?),
         };
         assert_eq!(found, Vec::<String>::new(), "{}", path.display());
+        assert!(scene.title.is_some(), "{}", path.display());
+        names.push(path.file_stem().ok_or("no name")?.to_string_lossy().into_owned());
     }
+    assert_eq!(
+        names.join(" "),
+        "ball_drop block_static cantilever collapse collision column_static compaction compaction_confined cook cook_plastic \
+         elastica foam rebound rebound_fast riemann riemann_jump ring slope taylor tube"
+    );
     Ok(())
 }

@@ -1,7 +1,8 @@
 //! Charts side by side in one picture, for print.
 
 use crate::axis::{Axis, range};
-use bfree::output::plot::{PlotError, png};
+use bfree::output::OutputError;
+use bfree::output::plot::png;
 use plotters::coord::Shift;
 use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint, Ranged};
 use plotters::element::DashedPathElement;
@@ -117,7 +118,7 @@ impl Sheet {
     ///
     /// # Errors
     /// Errors of the rendering library.
-    pub fn png(&self, svg: &str) -> Result<Vec<u8>, PlotError> {
+    pub fn png(&self, svg: &str) -> Result<Vec<u8>, OutputError> {
         png::from_svg(self.name, svg)
     }
 

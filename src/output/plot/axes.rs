@@ -116,10 +116,15 @@ impl Axes {
     }
 }
 
+/// Smallest and largest finite value; ∞ and −∞ if there is none.
+pub(super) fn extremes(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    let finite = values.filter(|x| x.is_finite());
+    finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)))
+}
+
 /// Range of the finite values, widened at either end by the fraction `padding`. The range is always wide enough for labels.
 pub(super) fn range(values: impl Iterator<Item = f64>, padding: f64) -> (f64, f64) {
-    let drawable = values.filter(|x| x.abs() < 1e100);
-    let (low, high) = drawable.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (x.min(a), x.max(b)));
+    let (low, high) = extremes(values.filter(|x| x.abs() < 1e100));
     if low > high {
         return (0.0, 1.0);
     }

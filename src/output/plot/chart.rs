@@ -1,7 +1,7 @@
 //! Lines against time, in panels one above the other.
 
 use super::axes::{AXIS_NAME, Axes, LABEL, TICK_LABELS, Ticks, range};
-use super::palette::{BLACK, Color, GREY};
+use super::palette::{BLACK, GREY};
 use super::svg::{Anchor, Point, Svg, shortened, width};
 
 /// Width of a figure, in SVG units.
@@ -26,8 +26,14 @@ const SUBTITLE: f64 = 13.0;
 pub(super) struct Line {
     /// Name; empty for a line that is not in the legend.
     pub label: String,
-    pub color: Color,
+    pub color: &'static str,
     pub points: Vec<Point>,
+}
+
+impl Line {
+    pub(super) fn new(label: &str, color: &'static str, points: Vec<Point>) -> Self {
+        Self { label: label.to_owned(), color, points }
+    }
 }
 
 /// One pair of axes.
@@ -74,20 +80,20 @@ impl Heading {
     /// Height of the heading.
     pub(super) const HEIGHT: f64 = 56.0;
 
-    /// Draws the heading in the middle of a picture of width `wide`.
-    pub(super) fn draw(&self, svg: &mut Svg, wide: f64) {
-        let most = wide - 20.0;
+    /// A picture with the heading in its middle.
+    pub(super) fn picture(&self, width: f64, height: f64) -> Svg {
+        let mut svg = Svg::new(width, height);
         let lines = [(&self.what, TITLE, 26.0, BLACK), (&self.run, SUBTITLE, 45.0, GREY)];
         for (text, size, base, color) in lines {
-            svg.text((wide / 2.0, base), Anchor::Middle, size, color, &shortened(text, size, most));
+            svg.text((width / 2.0, base), Anchor::Middle, size, color, &shortened(text, size, width - 20.0));
         }
+        svg
     }
 }
 
 /// The figure as SVG, with the given height in SVG units.
 pub(super) fn draw(heading: &Heading, height: f64, panels: &[Panel]) -> String {
-    let mut svg = Svg::new(WIDTH, height);
-    heading.draw(&mut svg, WIDTH);
+    let mut svg = heading.picture(WIDTH, height);
     let mut top = Heading::HEIGHT;
     let spans = |panel: &Panel| {
         let points = || panel.lines.iter().flat_map(|line| &line.points);
@@ -117,7 +123,9 @@ pub(super) fn draw(heading: &Heading, height: f64, panels: &[Panel]) -> String {
         let axes = Axes { corner: (left, top), size, x, y };
         let (level, upright) = ticks(panel);
         let last = number + 1 == panels.len();
-        axes.draw(&mut svg, [&level, &upright], [if last { panel.x.0 } else { "" }, &fitting(&panel.y, size.1)], true);
+        // Beside the name there must be room for a power of ten.
+        let upright_name = shortened(&panel.y, LABEL, size.1 - 60.0);
+        axes.draw(&mut svg, [&level, &upright], [if last { panel.x.0 } else { "" }, &upright_name], true);
         for line in &panel.lines {
             let thickness = if line.label.is_empty() { 0.8 } else { 1.8 };
             svg.line(thinned(&line.points).into_iter().map(|point| axes.place(point)), line.color, thickness);
@@ -126,11 +134,6 @@ pub(super) fn draw(heading: &Heading, height: f64, panels: &[Panel]) -> String {
         top += size.1 + between;
     }
     svg.finish()
-}
-
-/// A name shortened to fit beside an axis of this height, with room for a power of ten.
-fn fitting(name: &str, height: f64) -> String {
-    shortened(name, LABEL, height - 60.0)
 }
 
 fn name(line: &Line) -> String {
@@ -182,7 +185,7 @@ fn thinned(points: &[Point]) -> Vec<Point> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::output::plot::PlotError;
+    use crate::output::OutputError;
     use crate::output::plot::png::texts;
 
     #[test]
@@ -203,7 +206,7 @@ mod tests {
     }
 
     fn line(label: &str, high: f64) -> Line {
-        Line { label: label.to_owned(), color: BLACK, points: vec![(0.0, 0.0), (1.0, high)] }
+        Line::new(label, BLACK, vec![(0.0, 0.0), (1.0, high)])
     }
 
     #[test]
@@ -224,7 +227,7 @@ mod tests {
     }
 
     #[test]
-    fn panels_have_one_width_and_no_text_is_cut_or_covered() -> Result<(), PlotError> {
+    fn panels_have_one_width_and_no_text_is_cut_or_covered() -> Result<(), OutputError> {
         let long = "W".repeat(60);
         let narrow =
             Panel { caption: long.clone(), share: 0.4, ..Panel::over_time("balance", vec![line("balance", 1e-7)]) };

@@ -1,7 +1,8 @@
 //! The field that colours particles, chosen by name or by default.
 
-use super::error::PlotError;
-use crate::output::vtu::{Array, Snapshot, Values};
+use super::axes::extremes;
+use crate::output::OutputError;
+use crate::output::vtu::{Array, Snapshot};
 
 /// One number per particle.
 #[derive(Clone, Debug)]
@@ -15,8 +16,7 @@ pub(super) struct Colouring {
 impl Colouring {
     /// Smallest and largest finite value; ∞ and −∞ if there is none.
     pub(super) fn extremes(&self) -> (f64, f64) {
-        let finite = self.values.iter().filter(|x| x.is_finite());
-        finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &x| (low.min(x), high.max(x)))
+        extremes(self.values.iter().copied())
     }
 
     /// The field called `field`: an array of the snapshot, a component such as `stress_xx`, or `von_mises` where there is a stress. A
@@ -29,17 +29,13 @@ impl Colouring {
             return Some(Self { label, values: tuples(array, size) });
         }
         if field == "von_mises" {
-            let values = match (array("stress"), array("principal_stress")) {
-                (Some(stress), _) => tuples(stress, von_mises),
-                (None, Some(principal)) => tuples(principal, von_mises),
-                _ => return None,
-            };
-            return Some(Self { label, values });
+            let stress = array("stress").or(array("principal_stress"))?;
+            return Some(Self { label, values: tuples(stress, von_mises) });
         }
-        let (name, component) = field.rsplit_once('_')?;
-        let array = array(name)?;
-        let place = array.components.iter().position(|one| one == component)?;
-        Some(Self { label, values: tuples(array, |tuple| tuple[place]) })
+        snapshot.arrays.iter().find_map(|array| {
+            let place = array.columns().iter().position(|column| column == field)?;
+            Some(Self { label: label.clone(), values: tuples(array, |tuple| tuple[place]) })
+        })
     }
 
     /// The field that is asked for. The default is the plastic strain, else the von Mises stress, else the first field. In one dimension,
@@ -47,14 +43,14 @@ impl Colouring {
     ///
     /// # Errors
     /// The snapshot holds no such field.
-    pub(super) fn chosen(snapshot: &Snapshot, asked: Option<&str>) -> Result<Option<Self>, PlotError> {
+    pub(super) fn chosen(snapshot: &Snapshot, asked: Option<&str>) -> Result<Option<Self>, OutputError> {
         if let Some(field) = asked {
-            let unknown = || PlotError::Field { field: field.to_owned(), there: names(snapshot).join(", ") };
+            let unknown = || OutputError::NoField { field: field.to_owned(), there: names(snapshot).join(", ") };
             return Self::of(snapshot, field).map(Some).ok_or_else(unknown);
         }
-        let floats = || snapshot.arrays.iter().filter(|array| matches!(array.values, Values::Float(_)));
+        let floats = || snapshot.arrays.iter().filter(|array| !array.is_index);
         if snapshot.background.dimension == 1 {
-            return Ok(floats().find_map(|array| Self::of(snapshot, &component(array, 0))));
+            return Ok(floats().find_map(|array| Self::of(snapshot, array.columns().first()?)));
         }
         let worth = ["plastic_strain", "von_mises"].iter().find_map(|field| Self::of(snapshot, field));
         Ok(worth.or_else(|| floats().find_map(|array| Self::of(snapshot, &array.name))))
@@ -63,23 +59,15 @@ impl Colouring {
 
 /// All names that [`Colouring::of`] knows.
 fn names(snapshot: &Snapshot) -> Vec<String> {
-    let of_array = |array: &Array| {
-        let components = (0..array.components.len()).map(|k| component(array, k)).collect::<Vec<_>>();
-        if components.len() > 1 { [vec![array.name.clone()], components].concat() } else { components }
-    };
-    let mut names: Vec<String> = snapshot.arrays.iter().flat_map(of_array).collect();
+    let mut names = Vec::new();
+    for array in &snapshot.arrays {
+        names.extend((array.components.len() > 1).then(|| array.name.clone()));
+        names.extend(array.columns());
+    }
     if Colouring::of(snapshot, "von_mises").is_some() && !names.iter().any(|name| name == "von_mises") {
         names.push("von_mises".to_owned());
     }
     names
-}
-
-/// The name of a component of a field.
-fn component(array: &Array, place: usize) -> String {
-    match array.components.get(place).filter(|component| !component.is_empty()) {
-        Some(component) => format!("{}_{component}", array.name),
-        None => array.name.clone(),
-    }
 }
 
 /// A name in readable words.
@@ -89,11 +77,7 @@ pub(super) fn words(name: &str) -> String {
 
 /// One number per particle, computed from its tuple by `of`.
 fn tuples(array: &Array, of: impl Fn(&[f64]) -> f64) -> Vec<f64> {
-    let width = array.components.len().max(1);
-    match &array.values {
-        Values::Float(values) => values.chunks_exact(width).map(of).collect(),
-        Values::Index(values) => values.iter().map(|&x| f64::from(x)).collect(),
-    }
+    array.values.chunks_exact(array.components.len().max(1)).map(of).collect()
 }
 
 /// Length of a vector, Frobenius norm of a tensor, or the scalar itself.
@@ -123,19 +107,20 @@ mod tests {
         let array = |(name, components, values): &(&str, &[&str], &[f64])| Array {
             name: (*name).to_owned(),
             components: components.iter().map(|name| (*name).to_owned()).collect(),
-            values: Values::Float(values.to_vec()),
+            values: values.to_vec(),
+            is_index: false,
         };
         let background = Background { dimension, origin: [0.0; 3], spacing: 1.0, cells: [2; 3] };
         Snapshot { time: 0.0, background, points: vec![[0.5; 3]], arrays: arrays.iter().map(array).collect() }
     }
 
     #[test]
-    fn a_field_worth_colouring_is_found_and_any_can_be_asked_for() -> Result<(), PlotError> {
+    fn a_field_worth_colouring_is_found_and_any_can_be_asked_for() -> Result<(), OutputError> {
         let stress: (&str, &[&str], &[f64]) =
             ("stress", &["xx", "yy", "zz", "xy", "yz", "xz"], &[5.0, 2.0, 2.0, 4.0, 0.0, 0.0]);
         let displacement: (&str, &[&str], &[f64]) = ("displacement", &["x", "y", "z"], &[3.0, -4.0, 0.0]);
         let plane = snapshot(2, &[displacement, stress]);
-        let found = |snapshot: &Snapshot, field| -> Result<_, PlotError> {
+        let found = |snapshot: &Snapshot, field| -> Result<_, OutputError> {
             Ok(Colouring::chosen(snapshot, field)?.map(|one| (one.label, one.values)))
         };
         // In shear and tension: √(σ² + 3 τ²).

@@ -2,10 +2,11 @@
 
 use super::axes::rounded;
 use super::chart::{self, Heading, Line, Panel};
-use super::{PlotError, palette};
+use super::palette;
+use crate::output::OutputError;
+use crate::output::files::read_if_there;
 use serde::Deserialize;
 use serde_json::Value;
-use std::io::{BufRead, BufReader};
 use std::path::Path;
 
 /// Number of steps drawn besides the step with the most iterations.
@@ -35,45 +36,37 @@ fn fall(step: &Step) -> Vec<(f64, f64)> {
 /// assert!(svg.starts_with("<svg") && svg.contains("step 2"));
 /// ```
 pub fn newton_norms(title: &str, solutions: &[(&str, &[f64])]) -> String {
-    let line = |(k, (name, norms)): (usize, &(&str, &[f64]))| {
+    use palette::{BLACK, BLUE, GREEN, PURPLE, SKY, VERMILLION};
+    let colors = [BLUE, VERMILLION, GREEN, PURPLE, SKY, BLACK].iter().cycle();
+    let line = |((name, norms), color): (&(&str, &[f64]), &&'static str)| {
         let points = norms.iter().enumerate().map(|(k, norm)| (k as f64, norm.log10()));
-        let points = points.filter(|point| point.1.is_finite()).collect();
-        Line { label: (*name).to_owned(), color: palette::viridis(0.9 * k as f64 / solutions.len() as f64), points }
+        Line::new(name, color, points.filter(|point| point.1.is_finite()).collect())
     };
-    let lines = solutions.iter().enumerate().map(line).collect();
+    let lines = solutions.iter().zip(colors).map(line).collect();
     let panel = Panel { x: ("Newton iteration", true), ..Panel::over_time("log₁₀ |R|", lines) };
     chart::draw(&Heading { what: title.to_owned(), run: String::new() }, super::HEIGHT, &[panel])
 }
 
 /// The panel; `None` where no step was taken.
-pub(super) fn panel(report: Option<&Value>, directory: &Path) -> Result<Option<Panel>, PlotError> {
-    let steps = match report.map(|report| &report["steps"]).and_then(Value::as_array) {
+pub(super) fn panel(report: &Value, directory: &Path) -> Result<Option<Panel>, OutputError> {
+    let steps: Vec<Step> = match report["steps"].as_array() {
         Some(steps) => steps.iter().filter_map(|step| Step::deserialize(step).ok()).collect(),
-        None => logged(directory)?,
+        None => {
+            // A run that goes on or was killed. Its last line may be incomplete.
+            let log = read_if_there(&directory.join("newton.jsonl"))?.unwrap_or_default();
+            log.split(|&byte| byte == b'\n').filter_map(|line| serde_json::from_slice(line).ok()).collect()
+        }
     };
     // The first of several steps with the most iterations.
     let Some(worst) = steps.iter().rev().max_by_key(|step| step.newton_residuals.len()) else { return Ok(None) };
     let stride = steps.len().div_ceil(SAMPLE).max(1);
-    let thin = |points| Line { label: String::new(), color: palette::SKY, points };
-    let mut lines: Vec<Line> = steps.iter().step_by(stride).map(|step| thin(fall(step))).collect();
+    let sample = steps.iter().step_by(stride).map(|step| Line::new("", palette::SKY, fall(step)));
+    let mut lines: Vec<Line> = sample.collect();
     if let Some(first) = lines.first_mut() {
         first.label = if stride > 1 { format!("one step in {stride}") } else { "all steps".to_owned() };
     }
     let label = format!("t = {}: the most iterations", rounded(worst.time));
-    lines.push(Line { label, color: palette::VERMILLION, points: fall(worst) });
+    lines.push(Line::new(&label, palette::VERMILLION, fall(worst)));
     let panel = Panel::over_time("log₁₀ |R| / |R₀|", lines);
     Ok(Some(Panel { x: ("Newton iteration", true), ..panel }))
-}
-
-/// The steps of a run that goes on or was killed. The last line may be incomplete.
-fn logged(directory: &Path) -> Result<Vec<Step>, PlotError> {
-    let path = directory.join("newton.jsonl");
-    match std::fs::File::open(&path) {
-        Ok(file) => {
-            let lines = BufReader::new(file).lines().map_while(Result::ok);
-            Ok(lines.filter_map(|line| serde_json::from_str(&line).ok()).collect())
-        }
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(Vec::new()),
-        Err(source) => Err(PlotError::Read { path, source }),
-    }
 }

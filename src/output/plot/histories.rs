@@ -1,8 +1,9 @@
 //! Probes and reactions against time: one panel each, with its components.
 
 use super::chart::{Line, Panel};
+use super::palette;
 use super::table::Columns;
-use super::{PlotError, palette};
+use crate::output::OutputError;
 
 /// Largest number of panels in a picture.
 const MOST: usize = 8;
@@ -11,40 +12,41 @@ const MOST: usize = 8;
 pub(super) const ROUND_OFF: f64 = 1e-12;
 
 /// Colours of components. A tensor with more components repeats the first colours.
-const COLORS: [palette::Color; 6] =
+const COLORS: [&str; 6] =
     [palette::BLUE, palette::VERMILLION, palette::GREEN, palette::PURPLE, palette::SKY, palette::BLACK];
 
-/// One panel for each name in the columns of `table`, in order. Returns the first [`MOST`] panels, the number of panels before this limit,
-/// and the names of panels left out.
+/// One panel for each name in the columns of `table`, in order, at most [`MOST`]. Returns the panels, and a text with the number of panels
+/// before this limit and the names of panels left out.
 ///
 /// A panel is left out if everything in it is 0, up to the round-off of the largest panel of the same `quantity`.
-pub(super) fn panels(
-    table: &Columns,
-    quantity: impl Fn(&str) -> String,
-) -> Result<(Vec<Panel>, usize, Vec<String>), PlotError> {
+pub(super) fn panels(table: &Columns, quantity: impl Fn(&str) -> String) -> Result<(Vec<Panel>, String), OutputError> {
     let mut panels: Vec<Panel> = Vec::new();
-    for column in table.names().iter().filter(|column| *column != "time") {
+    for column in table.names.iter().filter(|column| *column != "time") {
         let (name, component) = split(column);
-        if panels.last().is_none_or(|panel| panel.y != name) {
-            panels.push(Panel::over_time(name, Vec::new()));
-        }
-        if let Some(panel) = panels.last_mut() {
-            let color = COLORS[panel.lines.len() % COLORS.len()];
-            panel.lines.push(Line { label: component.to_owned(), color, points: table.pairs("time", column)? });
+        let points = table.pairs("time", column)?;
+        let line = |k: usize| Line::new(component, COLORS[k % COLORS.len()], points);
+        match panels.last_mut().filter(|panel| panel.y == name) {
+            Some(panel) => panel.lines.push(line(panel.lines.len())),
+            None => panels.push(Panel::over_time(name, vec![line(0)])),
         }
     }
-    let largest = |of: &Panel| {
-        let same = panels.iter().filter(|panel| quantity(&panel.y) == quantity(&of.y));
-        same.map(Panel::size).fold(0.0, f64::max)
+    let is_zero = |panel: &Panel| {
+        let same = panels.iter().filter(|other| quantity(&other.y) == quantity(&panel.y));
+        panel.size() <= ROUND_OFF * same.map(Panel::size).fold(0.0, f64::max)
     };
-    let nothing: Vec<bool> = panels.iter().map(|panel| panel.size() <= ROUND_OFF * largest(panel)).collect();
-    let (mut shown, mut left_out) = (Vec::new(), Vec::new());
-    for (panel, nothing) in panels.into_iter().zip(nothing) {
-        if nothing { left_out.push(panel.y) } else { shown.push(panel) }
+    let zero: Vec<bool> = panels.iter().map(is_zero).collect();
+    let mut zero = zero.into_iter();
+    let left_out: Vec<Panel> = panels.extract_if(.., |_| zero.next() == Some(true)).collect();
+    let mut text = String::new();
+    if panels.len() > MOST {
+        text = format!(", the first {MOST} of {}", panels.len());
+        panels.truncate(MOST);
     }
-    let there = shown.len();
-    shown.truncate(MOST);
-    Ok((shown, there, left_out))
+    if !left_out.is_empty() {
+        let names: Vec<&str> = left_out.iter().map(|panel| panel.y.as_str()).collect();
+        text += &format!("; zero: {}", names.join(", "));
+    }
+    Ok((panels, text))
 }
 
 /// Name and component of a column; twice the name if there is no component.
@@ -67,8 +69,8 @@ mod tests {
             "time,tip_x,tip_y,mid_point,s_xx,s_xy,still_x,still_y\n0,1,2,3,4,5,0,0\n1,2,NaN,4,5,6,1e-15,-2e-16\n";
         std::fs::write(&path, rows)?;
         let quantity = |name: &str| if name == "s" { "stress" } else { "displacement" }.to_owned();
-        let (panels, there, left_out) = panels(&Columns::read(path)?, quantity)?;
-        assert_eq!((there, left_out), (3, vec!["still".to_owned()]));
+        let (panels, text) = panels(&Columns::read(path)?, quantity)?;
+        assert_eq!(text, "; zero: still");
         let shown: Vec<_> = panels.iter().map(|panel| (panel.y.as_str(), panel.lines.len())).collect();
         assert_eq!(shown, [("tip", 2), ("mid_point", 1), ("s", 2)]);
         assert_eq!(panels[2].lines[1].label, "xy");

@@ -9,7 +9,6 @@ mod axes;
 mod chart;
 mod colouring;
 mod convergence;
-mod error;
 mod histories;
 mod html;
 mod neighbours;
@@ -18,23 +17,22 @@ mod particles;
 mod player;
 pub mod png;
 mod run_report;
-mod series;
 mod svg;
 mod table;
 mod view;
 
 pub use convergence::newton_norms;
-pub use error::PlotError;
 pub use view::View;
 
-use super::OutputError;
 use super::files::write_atomically;
 use super::vtu::Snapshot;
+use super::{OutputError, pvd};
+use axes::extremes;
 use chart::{Heading, Line, Panel};
 use colouring::Colouring;
 use histories::ROUND_OFF;
 use player::Recording;
-use run_report::{has_inertia, quantity};
+use run_report::{has_inertia, quantity, title};
 use serde_json::Value;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -112,121 +110,114 @@ pub(crate) fn is_picture(file: &str) -> bool {
 /// # Errors
 /// `history.csv` is missing or damaged. Another table, the report or a snapshot is damaged. The snapshots do not hold the field of `look`.
 /// The operating system refuses.
-pub fn plot_run(directory: &Path, look: &Look) -> Result<Vec<PathBuf>, PlotError> {
+pub fn plot_run(directory: &Path, look: &Look) -> Result<Vec<PathBuf>, OutputError> {
     let report = run_report::read(directory)?;
-    let pictures = charts(directory, report.as_ref())?;
-    let snapshots = series::files(directory)?;
-    let mut played = None;
+    let pictures = charts(directory, &report)?;
+    let snapshots = pvd::files(directory)?;
+    let recording = Recording::read(&snapshots)?;
     // The particles are not on the page: the player shows them.
-    let mut last = None;
-    if let Some(recording) = Recording::read(&snapshots)? {
+    let mut particles = None;
+    if let Some(recording) = &recording {
         let snapshot = at_time(directory, &snapshots, look.time)?;
-        let (dimension, moves) = (snapshot.background.dimension, recording.motion());
-        let plane = series::view(dimension, moves);
         let colouring = Colouring::chosen(&snapshot, look.field.as_deref())?;
-        let scene = particles::Scene {
-            directions: view::Directions::new(look.view, dimension, plane),
-            bounds: recording.bounds(),
-            span: colouring.as_ref().map_or((0.0, 1.0), Colouring::extremes),
-            run: run_report::title(report.as_ref()),
-        };
-        last = Some(("particles", particles::draw(&snapshot, &scene, colouring.as_ref())));
-        played = Some(recording.page(plane));
+        let span = colouring.as_ref().map_or((0.0, 1.0), Colouring::extremes);
+        let scene = scene(look, recording, span, &report);
+        particles = Some(("particles", particles::draw(&snapshot, &scene, colouring.as_ref())));
     }
     let mut written = Vec::new();
-    let mut keep = |file: &str, content: &[u8]| -> Result<(), PlotError> {
+    let mut keep = |file: &str, content: &[u8]| -> Result<(), OutputError> {
         let path = directory.join(file);
         write_atomically(&path, |file| file.write_all(content))?;
         written.push(path);
         Ok(())
     };
-    for (name, svg) in pictures.iter().chain(&last) {
+    for (name, svg) in pictures.iter().chain(&particles) {
         for &format in &look.formats {
             let file = format!("{name}.{format}");
             if format == "png" { keep(&file, &png::from_svg(name, svg)?)? } else { keep(&file, svg.as_bytes())? }
         }
     }
-    keep(PAGE, html::page(report.as_ref(), played.as_ref(), &pictures).as_bytes())?;
+    let played = recording.as_ref().map(Recording::page);
+    keep(PAGE, html::page(&report, played.as_ref(), &pictures).as_bytes())?;
     Ok(written)
 }
 
 /// The snapshot nearest to a time; without a time, the last snapshot.
-fn at_time(directory: &Path, snapshots: &[PathBuf], time: Option<f64>) -> Result<Snapshot, PlotError> {
-    let mut nearest: Option<Snapshot> = None;
-    for path in snapshots.iter().rev() {
+fn at_time(directory: &Path, snapshots: &[PathBuf], time: Option<f64>) -> Result<Snapshot, OutputError> {
+    let [earlier @ .., last] = snapshots else { return Err(OutputError::NoSnapshots(directory.to_owned())) };
+    let mut nearest = Snapshot::read(last)?;
+    let Some(time) = time else { return Ok(nearest) };
+    for path in earlier.iter().rev() {
         let snapshot = Snapshot::read(path)?;
-        let Some(time) = time else { return Ok(snapshot) };
-        let far = |one: &Snapshot| (one.time - time).abs();
-        if nearest.as_ref().is_some_and(|best| far(best) <= far(&snapshot)) {
+        if (nearest.time - time).abs() <= (snapshot.time - time).abs() {
             break;
         }
-        nearest = Some(snapshot);
+        nearest = snapshot;
     }
-    nearest.ok_or(PlotError::NoSnapshots { directory: directory.to_owned() })
+    Ok(nearest)
+}
+
+/// The settings that all pictures of the particles of a run have in common.
+fn scene(look: &Look, recording: &Recording, span: (f64, f64), report: &Value) -> particles::Scene {
+    let directions = view::Directions::new(look.view, recording.background.dimension, recording.plane());
+    particles::Scene { directions, bounds: recording.bounds(), span, run: title(report).to_owned() }
 }
 
 /// The charts over time, with their names.
-fn charts(directory: &Path, report: Option<&Value>) -> Result<Vec<(&'static str, String)>, PlotError> {
+fn charts(directory: &Path, report: &Value) -> Result<Vec<(&'static str, String)>, OutputError> {
     let history = Columns::read(directory.join("history.csv"))?;
-    let run = run_report::title(report);
-    let heading = |what: &str| Heading { what: what.to_owned(), run: run.clone() };
-    let mut pictures =
-        vec![("energies", chart::draw(&heading("Energies"), HEIGHT, &energies(&history, has_inertia(report))?))];
+    let mut pictures = Vec::new();
+    let mut draw = |name, what: &str, height, panels: &[Panel]| {
+        let heading = Heading { what: what.to_owned(), run: title(report).to_owned() };
+        pictures.push((name, chart::draw(&heading, height, panels)));
+    };
+    draw("energies", "Energies", HEIGHT, &energies(&history, has_inertia(report))?);
     if let Some(panel) = momentum(&history, report)? {
-        pictures.push(("momentum", chart::draw(&heading("Momentum"), HEIGHT, &[panel])));
+        draw("momentum", "Momentum", HEIGHT, &[panel]);
     }
     for (name, title) in [("probes", "Probes"), ("reactions", "Reactions: forces of walls and regions on the bodies")] {
         let path = directory.join(format!("{name}.csv"));
         if !path.is_file() {
             continue;
         }
-        let (panels, there, left_out) =
-            histories::panels(&Columns::read(path)?, |panel| quantity(report, name, panel))?;
-        if panels.is_empty() {
-            continue;
+        let (panels, left_out) = histories::panels(&Columns::read(path)?, |panel| quantity(report, name, panel))?;
+        if !panels.is_empty() {
+            draw(name, &format!("{title}{left_out}"), 110.0 + 190.0 * panels.len() as f64, &panels);
         }
-        let more =
-            if panels.len() < there { format!(", the first {} of {there}", panels.len()) } else { String::new() };
-        let zero = if left_out.is_empty() { String::new() } else { format!("; zero: {}", left_out.join(", ")) };
-        let height = 110.0 + 190.0 * panels.len() as f64;
-        pictures.push((name, chart::draw(&heading(&format!("{title}{more}{zero}")), height, &panels)));
     }
     // The first row is the state before the first step.
-    let count = |column: &str, name: &str, color| -> Result<Panel, PlotError> {
+    let count = |column: &str, name: &str, color| -> Result<Panel, OutputError> {
         let points = history.pairs("time", column)?.into_iter().skip(1).collect();
-        Ok(Panel::over_time(name, vec![Line { label: name.to_owned(), color, points }]))
+        Ok(Panel::over_time(name, vec![Line::new(name, color, points)]))
     };
     let iterations = [count("newton", "Newton", palette::BLUE)?, count("krylov", "Krylov", palette::VERMILLION)?];
-    pictures.push(("iterations", chart::draw(&heading("Iterations in each step"), HEIGHT, &iterations)));
+    draw("iterations", "Iterations in each step", HEIGHT, &iterations);
     if let Some(panel) = convergence::panel(report, directory)? {
-        pictures.push(("convergence", chart::draw(&heading("Convergence of Newton's method"), HEIGHT, &[panel])));
+        draw("convergence", "Convergence of Newton's method", HEIGHT, &[panel]);
     }
     Ok(pictures)
 }
 
-/// A column of the history as a line.
-fn column(history: &Columns, column: &str, label: &str, color: palette::Color) -> Result<Line, PlotError> {
-    Ok(Line { label: label.to_owned(), color, points: history.pairs("time", column)? })
+/// Columns of the history as lines: each with its name, label and colour.
+fn lines(history: &Columns, columns: &[(&str, &str, &'static str)]) -> Result<Vec<Line>, OutputError> {
+    let line =
+        |(name, label, color): &(&str, &str, &'static str)| Ok(Line::new(label, *color, history.pairs("time", name)?));
+    columns.iter().map(line).collect()
 }
 
 /// Panels of the energies, and of their balance if there is inertia. In load steps, loads act at once, and a balance says nothing of their
 /// work.
-fn energies(history: &Columns, has_inertia: bool) -> Result<Vec<Panel>, PlotError> {
-    let mut lines = vec![
-        column(history, "strain", "strain", palette::VERMILLION)?,
-        column(history, "external", "external work", palette::GREEN)?,
-    ];
-    if history.has("dissipated") {
-        let dissipated = column(history, "dissipated", "dissipated", palette::SKY)?;
-        lines.extend(dissipated.points.iter().any(|point| point.1 != 0.0).then_some(dissipated));
+fn energies(history: &Columns, has_inertia: bool) -> Result<Vec<Panel>, OutputError> {
+    let mut columns = vec![("strain", "strain", palette::VERMILLION), ("external", "external work", palette::GREEN)];
+    if history.has("dissipated") && history.pairs("time", "dissipated")?.iter().any(|point| point.1 != 0.0) {
+        columns.push(("dissipated", "dissipated", palette::SKY));
     }
     if !has_inertia {
-        return Ok(vec![Panel::over_time("energy", lines)]);
+        return Ok(vec![Panel::over_time("energy", lines(history, &columns)?)]);
     }
-    lines.push(column(history, "total", "total", palette::BLACK)?);
-    lines.push(column(history, "kinetic", "kinetic", palette::BLUE)?);
-    let energies = Panel { share: 3.0, ..Panel::over_time("energy", lines) };
-    let balance = Panel::over_time("balance", vec![column(history, "balance", "balance", palette::PURPLE)?]);
+    columns.extend([("total", "total", palette::BLACK), ("kinetic", "kinetic", palette::BLUE)]);
+    let energies = Panel { share: 3.0, ..Panel::over_time("energy", lines(history, &columns)?) };
+    let balance = Panel::over_time("balance", lines(history, &[("balance", "balance", palette::PURPLE)])?);
     let caption = "balance: total + dissipated − initial energy − external work".to_owned();
     if balance.size() <= ROUND_OFF * energies.size() {
         let caption = format!("{caption}, at most {:.0e}", balance.size());
@@ -237,20 +228,19 @@ fn energies(history: &Columns, has_inertia: bool) -> Result<Vec<Panel>, PlotErro
 
 /// The momentum of a run with inertia. `None` if it is round-off of its scale, |p| ≤ √(2 M K), with the mass M and the largest kinetic
 /// energy K.
-fn momentum(history: &Columns, report: Option<&Value>) -> Result<Option<Panel>, PlotError> {
+fn momentum(history: &Columns, report: &Value) -> Result<Option<Panel>, OutputError> {
     if !has_inertia(report) {
         return Ok(None);
     }
-    let axes = [
+    let mut axes = vec![
         ("momentum_x", "x", palette::BLUE),
         ("momentum_y", "y", palette::VERMILLION),
         ("momentum_z", "z", palette::GREEN),
     ];
-    let axes = axes.into_iter().filter(|(column, ..)| history.has(column));
-    let lines = axes.map(|(name, label, color)| column(history, name, label, color)).collect::<Result<Vec<_>, _>>()?;
-    let panel = Panel::over_time("momentum", lines);
-    let kinetic = Panel::over_time("", vec![column(history, "kinetic", "", palette::BLUE)?]).size();
-    let mass = report.and_then(|report| report["mass"].as_f64()).unwrap_or(0.0);
+    axes.retain(|(column, ..)| history.has(column));
+    let panel = Panel::over_time("momentum", lines(history, &axes)?);
+    let kinetic = Panel::over_time("", lines(history, &[("kinetic", "", palette::BLUE)])?).size();
+    let mass = report["mass"].as_f64().unwrap_or(0.0);
     Ok(Some(panel).filter(|panel| panel.size() > ROUND_OFF * (2.0 * mass * kinetic).sqrt()))
 }
 
@@ -259,23 +249,18 @@ fn momentum(history: &Columns, report: Option<&Value>) -> Result<Option<Panel>, 
 ///
 /// # Errors
 /// There are no snapshots, or a snapshot is damaged. The snapshots do not hold the field of `look`. The operating system refuses.
-pub fn plot_frames(directory: &Path, frames: &Path, look: &Look) -> Result<Vec<PathBuf>, PlotError> {
-    let snapshots = series::files(directory)?;
-    let Some(recording) = Recording::read(&snapshots)? else {
-        return Err(PlotError::NoSnapshots { directory: directory.to_owned() });
-    };
+pub fn plot_frames(directory: &Path, frames: &Path, look: &Look) -> Result<Vec<PathBuf>, OutputError> {
+    let snapshots = pvd::files(directory)?;
+    let none = || OutputError::NoSnapshots(directory.to_owned());
+    let recording = Recording::read(&snapshots)?.ok_or_else(none)?;
     std::fs::create_dir_all(frames).map_err(OutputError::io("create", frames))?;
-    let (mut span, mut dimension) = ((f64::INFINITY, f64::NEG_INFINITY), 2);
+    let mut ends = Vec::new();
     for path in &snapshots {
-        let snapshot = Snapshot::read(path)?;
-        let colouring = Colouring::chosen(&snapshot, look.field.as_deref())?;
+        let colouring = Colouring::chosen(&Snapshot::read(path)?, look.field.as_deref())?;
         let (low, high) = colouring.as_ref().map_or((0.0, 1.0), Colouring::extremes);
-        span = (span.0.min(low), span.1.max(high));
-        dimension = snapshot.background.dimension;
+        ends.extend([low, high]);
     }
-    let directions = view::Directions::new(look.view, dimension, series::view(dimension, recording.motion()));
-    let run = run_report::title(run_report::read(directory)?.as_ref());
-    let scene = particles::Scene { directions, bounds: recording.bounds(), span, run };
+    let scene = scene(look, &recording, extremes(ends.into_iter()), &run_report::read(directory)?);
     let mut written = Vec::new();
     for (number, path) in snapshots.iter().enumerate() {
         let snapshot = Snapshot::read(path)?;
@@ -303,7 +288,7 @@ mod tests {
         };
         // Bodies of mass 4 that move with an energy of 2 have a momentum of up to 4.
         let report = json!({ "mass": 4.0 });
-        let momentum = |history: &Columns| momentum(history, Some(&report)).map(|panel| panel.is_some());
+        let momentum = |history: &Columns| momentum(history, &report).map(|panel| panel.is_some());
         let (round_off, real) = (table(-1e-15, 3e-16)?, table(1e-9, 1e-9)?);
         assert_eq!((momentum(&round_off)?, momentum(&real)?), (false, true));
         // A balance of round-off is described in the caption.

@@ -1,6 +1,7 @@
 //! Neighbours of a particle: their distance, and the Voronoi cell of the particle.
 
 use crate::output::vtu::{Background, Snapshot};
+use crate::tensor::Vector;
 use std::collections::{HashMap, HashSet};
 
 /// Corners of the initial polygon of a cell.
@@ -67,36 +68,33 @@ impl<'a> Neighbours<'a> {
 
     /// Voronoi cell of `p` in the plane, a polygon. At the surface of a body, a neighbour may lack a counterpart on the other side. The
     /// cell then ends as far out as it does inwards.
-    pub(super) fn cell(&self, p: usize) -> Vec<[f64; 2]> {
+    pub(super) fn cell(&self, p: usize) -> Vec<Vector<f64, 2>> {
         let points = &self.snapshot.points;
-        let [x, y, _] = points[p];
+        let plane = |p: usize| Vector::from([points[p][0], points[p][1]]);
+        let centre = plane(p);
         let distance = self.distance(p);
         let reach = self.mean.max(distance);
-        let around: Vec<[f64; 2]> = self.around(p).map(|q| [points[q][0] - x, points[q][1] - y]).collect();
-        let length = |v: &[f64; 2]| v[0].hypot(v[1]);
+        let around: Vec<Vector<f64, 2>> = self.around(p).map(|q| plane(q) - centre).collect();
         // Bisectors with the neighbours, and with mirrored neighbours where none lies within 60° of the opposite direction.
-        let mut towards: Vec<[f64; 2]> = around.iter().copied().filter(|v| length(v) < 2.0 * reach).collect();
-        let missing = |v: &[f64; 2]| {
-            let along = |other: &[f64; 2]| other[0] * v[0] + other[1] * v[1];
-            around.iter().all(|other| along(other) <= 0.5 * length(other) * length(v))
-        };
-        let surface: Vec<[f64; 2]> = towards.iter().map(|v| v.map(|x| -x)).filter(missing).collect();
+        let mut towards: Vec<_> = around.iter().copied().filter(|v| v.norm() < 2.0 * reach).collect();
+        let missing = |v: &Vector<f64, 2>| around.iter().all(|other| other.dot(v) <= 0.5 * other.norm() * v.norm());
+        let surface: Vec<_> = towards.iter().map(|v| -v).filter(missing).collect();
         // The corners of a cell in a square lattice are 0.71 distances away.
         let radius = if surface.is_empty() { reach } else { 0.8 * distance };
         towards.extend(surface);
         let corner = |k: usize| {
             let angle = (k as f64 + 0.5) * std::f64::consts::TAU / CORNERS as f64;
-            [x + radius * angle.cos(), y + radius * angle.sin()]
+            centre + radius * Vector::from([angle.cos(), angle.sin()])
         };
-        let whole: Vec<[f64; 2]> = (0..CORNERS).map(corner).collect();
+        let whole: Vec<_> = (0..CORNERS).map(corner).collect();
         // Positive at points that are nearer to the neighbour.
-        let beyond = |[u, v]: [f64; 2]| move |at: &[f64; 2]| (at[0] - x - u / 2.0) * u + (at[1] - y - v / 2.0) * v;
+        let beyond = |v: Vector<f64, 2>| move |at: &Vector<f64, 2>| (at - centre - v / 2.0).dot(&v);
         towards.into_iter().fold(whole, |polygon, v| cut(&polygon, beyond(v)))
     }
 }
 
 /// The part of a convex polygon where the linear function `beyond` is not positive.
-fn cut(polygon: &[[f64; 2]], beyond: impl Fn(&[f64; 2]) -> f64) -> Vec<[f64; 2]> {
+fn cut(polygon: &[Vector<f64, 2>], beyond: impl Fn(&Vector<f64, 2>) -> f64) -> Vec<Vector<f64, 2>> {
     let mut kept = Vec::with_capacity(polygon.len() + 1);
     for (k, from) in polygon.iter().enumerate() {
         let to = &polygon[(k + 1) % polygon.len()];
@@ -105,8 +103,7 @@ fn cut(polygon: &[[f64; 2]], beyond: impl Fn(&[f64; 2]) -> f64) -> Vec<[f64; 2]>
             kept.push(*from);
         }
         if (a < 0.0 && b > 0.0) || (a > 0.0 && b < 0.0) {
-            let part = a / (a - b);
-            kept.push([0, 1].map(|axis| from[axis] + part * (to[axis] - from[axis])));
+            kept.push(from + (to - from) * (a / (a - b)));
         }
     }
     kept

@@ -1,29 +1,17 @@
-//! Colours that remain distinct to colour-blind readers.
-
-use std::fmt::{Display, Formatter, Result};
-
-/// Red, green and blue; written as SVG does.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Color(u8, u8, u8);
-
-impl Display for Color {
-    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
-        write!(f, "#{:02x}{:02x}{:02x}", self.0, self.1, self.2)
-    }
-}
+//! Colours that remain distinct to colour-blind readers, as SVG writes them.
 
 // Okabe and Ito, "Color Universal Design", 2008.
-pub(super) const BLACK: Color = Color(0, 0, 0);
-pub(super) const BLUE: Color = Color(0, 114, 178);
-pub(super) const SKY: Color = Color(86, 180, 233);
-pub(super) const VERMILLION: Color = Color(213, 94, 0);
-pub(super) const GREEN: Color = Color(0, 158, 115);
-pub(super) const PURPLE: Color = Color(204, 121, 167);
+pub(super) const BLACK: &str = "#000000";
+pub(super) const BLUE: &str = "#0072b2";
+pub(super) const SKY: &str = "#56b4e9";
+pub(super) const VERMILLION: &str = "#d55e00";
+pub(super) const GREEN: &str = "#009e73";
+pub(super) const PURPLE: &str = "#cc79a7";
 
 /// Frames, ticks and secondary text.
-pub(super) const GREY: Color = Color(70, 70, 70);
+pub(super) const GREY: &str = "#464646";
 /// Grid lines.
-pub(super) const LIGHT: Color = Color(222, 222, 222);
+pub(super) const LIGHT: &str = "#dedede";
 
 /// Viridis (Smith, van der Walt; CC0), every eighth of its range.
 pub(super) const VIRIDIS: [[f64; 3]; 9] = [
@@ -39,11 +27,11 @@ pub(super) const VIRIDIS: [[f64; 3]; 9] = [
 ];
 
 /// The colour of `x` in [0, 1]. A value outside gets the colour of the nearest end, NaN the colour of 0.
-pub(super) fn viridis(x: f64) -> Color {
+pub(super) fn viridis(x: f64) -> String {
     let last = VIRIDIS.len() - 1;
     let place = if x.is_nan() { 0.0 } else { x.clamp(0.0, 1.0) * last as f64 };
     let piece = (place as usize).min(last - 1);
     let weight = place - piece as f64;
     let mix = |k: usize| (VIRIDIS[piece][k] * (1.0 - weight) + VIRIDIS[piece + 1][k] * weight).round() as u8;
-    Color(mix(0), mix(1), mix(2))
+    format!("#{:02x}{:02x}{:02x}", mix(0), mix(1), mix(2))
 }

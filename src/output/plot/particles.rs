@@ -1,12 +1,13 @@
 //! The particles of a snapshot over the background grid, coloured by a field.
 
-use super::axes::{AXIS_NAME, Axes, LABEL, TICK_LABELS, Ticks, range};
+use super::axes::{AXIS_NAME, Axes, LABEL, TICK_LABELS, Ticks, extremes, range};
 use super::chart::Heading;
 use super::colouring::Colouring;
 use super::neighbours::Neighbours;
-use super::palette::{BLACK, BLUE, Color, GREY, LIGHT, viridis};
+use super::palette::{BLACK, BLUE, GREY, LIGHT, viridis};
 use super::svg::{Anchor, Point, Svg, width};
-use super::view::{Directions, dot};
+use super::view::Directions;
+use crate::output::history::AXES;
 use crate::output::vtu::Snapshot;
 
 /// Largest width of the drawing.
@@ -14,6 +15,9 @@ const MAX_WIDTH: f64 = 760.0;
 
 /// Largest height of the drawing.
 const MAX_HEIGHT: f64 = 620.0;
+
+/// Height below the drawing, for tick labels and the name of the axis.
+const BELOW: f64 = TICK_LABELS + AXIS_NAME + 8.0;
 
 /// Smallest width and height of the drawing.
 const MIN_SIZE: f64 = 160.0;
@@ -42,9 +46,17 @@ pub(super) struct Scene {
     pub run: String,
 }
 
+/// A picture under construction: the particles `ids` of a snapshot.
+struct Frame<'a> {
+    snapshot: &'a Snapshot,
+    scene: &'a Scene,
+    colouring: Option<&'a Colouring>,
+    ids: Vec<usize>,
+}
+
 /// The picture as SVG. In one dimension the field is drawn over x.
 pub(super) fn draw(snapshot: &Snapshot, scene: &Scene, colouring: Option<&Colouring>) -> String {
-    let low_high = range([scene.span.0, scene.span.1].into_iter(), 0.0);
+    let span = range([scene.span.0, scene.span.1].into_iter(), 0.0);
     let label = colouring.map_or("particles", |one| &one.label);
     let stride = snapshot.points.len().div_ceil(MAX_DRAWN).max(1);
     let part = if stride > 1 { format!(", one particle in {stride}") } else { String::new() };
@@ -52,9 +64,9 @@ pub(super) fn draw(snapshot: &Snapshot, scene: &Scene, colouring: Option<&Colour
     let rest: String = label.chars().skip(1).collect();
     let what = format!("{first}{rest}, t = {}{part}", super::axes::rounded(snapshot.time));
     let heading = Heading { what, run: scene.run.clone() };
-    let ids: Vec<usize> = (0..snapshot.points.len()).step_by(stride).collect();
+    let frame = Frame { snapshot, scene, colouring, ids: (0..snapshot.points.len()).step_by(stride).collect() };
     if snapshot.background.dimension == 1 {
-        return over_x(snapshot, scene, &heading, &ids, colouring);
+        return frame.over_x(&heading);
     }
     let (mut x, mut y) = scene.window(snapshot);
     let scale = (MAX_WIDTH / (x.1 - x.0)).min(MAX_HEIGHT / (y.1 - y.0));
@@ -62,27 +74,21 @@ pub(super) fn draw(snapshot: &Snapshot, scene: &Scene, colouring: Option<&Colour
     let flat = scene.directions.plane();
     let ticks = [Ticks::new(x, (size.0 / 80.0) as usize, false), Ticks::new(y, (size.1 / 60.0) as usize, false)];
     let left = if flat.is_some() { Axes::left(&ticks[1]) } else { 50.0 };
-    let bar = Ticks::new(low_high, (size.1 / 60.0) as usize, false);
+    let bar = Ticks::new(span, (size.1 / 60.0) as usize, false);
     let beside = if colouring.is_some() { 24.0 + 16.0 + 10.0 + bar.width() + 2.0 * LABEL + 8.0 } else { 20.0 };
     let wide = left + size.0 + beside;
-    let mut svg = Svg::new(wide, Heading::HEIGHT + size.1 + TICK_LABELS + AXIS_NAME + 8.0);
-    heading.draw(&mut svg, wide);
+    let mut svg = heading.picture(wide, Heading::HEIGHT + size.1 + BELOW);
     let axes = Axes { corner: (left, Heading::HEIGHT), size, x, y };
     match flat {
         Some([right, up]) => {
             grid(&mut svg, snapshot, &axes, [right, up], scale);
-            let names = ["x", "y", "z"];
-            axes.draw(&mut svg, [&ticks[0], &ticks[1]], [names[right], names[up]], false);
+            axes.draw(&mut svg, [&ticks[0], &ticks[1]], [AXES[right], AXES[up]], false);
         }
         None => edges(&mut svg, scene, &axes),
     }
-    let color = |p: usize| {
-        let value = colouring.and_then(|one| one.values.get(p).copied());
-        value.map_or(BLUE, |value| viridis((value - low_high.0) / (low_high.1 - low_high.0)))
-    };
-    bodies(&mut svg, snapshot, scene, &axes, &ids, &color);
+    frame.bodies(&mut svg, &axes, span);
     if colouring.is_some() {
-        colour_bar(&mut svg, &axes, low_high, &bar, label);
+        colour_bar(&mut svg, &axes, span, &bar, label);
     }
     svg.finish()
 }
@@ -104,12 +110,8 @@ impl Scene {
     /// Horizontal and vertical extent of the picture: the box and one cell around it. In a plane, the extent ends at the grid.
     fn window(&self, snapshot: &Snapshot) -> ((f64, f64), (f64, f64)) {
         let grid = &snapshot.background;
-        let corners = (0..8).map(|number| self.directions.project(&self.corner(number)));
-        let (mut x, mut y) = ((f64::INFINITY, f64::NEG_INFINITY), (f64::INFINITY, f64::NEG_INFINITY));
-        for (right, up) in corners {
-            x = (x.0.min(right), x.1.max(right));
-            y = (y.0.min(up), y.1.max(up));
-        }
+        let corners = || (0..8).map(|number| self.directions.project(self.corner(number)));
+        let (x, y) = (extremes(corners().map(|corner| corner.0)), extremes(corners().map(|corner| corner.1)));
         let plane = self.directions.plane();
         // Discs at a wall reach beyond the grid.
         let beyond = if grid.dimension == 3 { 0.5 * grid.spacing } else { 0.0 };
@@ -146,13 +148,11 @@ fn grid(svg: &mut Svg, snapshot: &Snapshot, axes: &Axes, plane: [usize; 2], scal
 
 /// Draws the edges of the box behind the particles, and labels along one edge of each axis at the outline.
 fn edges(svg: &mut Svg, scene: &Scene, axes: &Axes) {
-    let place = |number: usize| axes.place(scene.directions.project(&scene.corner(number)));
-    let nearest = (0..8).max_by(|&a, &b| {
-        let depth = |number: usize| dot(&scene.directions.toward, &scene.corner(number));
-        depth(a).total_cmp(&depth(b))
-    });
+    let place = |number: usize| axes.place(scene.directions.project(scene.corner(number)));
+    let depth = |number: usize| scene.directions.depth(scene.corner(number));
+    let nearest = (0..8).max_by(|&a, &b| depth(a).total_cmp(&depth(b)));
     let (mut names, mut numbers) = (Vec::new(), Vec::new());
-    for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+    for (axis, name) in AXES.into_iter().enumerate() {
         let starts = || (0..8).filter(|number| number >> axis & 1 == 0);
         let end = |start: usize| start | 1 << axis;
         for start in starts().filter(|&start| Some(start) != nearest && Some(end(start)) != nearest) {
@@ -194,7 +194,7 @@ struct Beside {
     point: Point,
     left: bool,
     far: f64,
-    color: Color,
+    color: &'static str,
     text: String,
 }
 
@@ -222,32 +222,55 @@ impl Beside {
     }
 }
 
-/// Draws the particles: cells in the plane, discs in space. The disc nearest to the eye is drawn last.
-fn bodies(
-    svg: &mut Svg,
-    snapshot: &Snapshot,
-    scene: &Scene,
-    axes: &Axes,
-    ids: &[usize],
-    color: &dyn Fn(usize) -> Color,
-) {
-    let neighbours = Neighbours::new(snapshot, ids);
-    let finite = |p: &usize| snapshot.points[*p].iter().all(|x| x.is_finite());
-    let mut order: Vec<usize> = (0..ids.len()).filter(|&k| finite(&ids[k])).collect();
-    if snapshot.background.dimension == 2 && scene.directions.plane() == Some([0, 1]) && ids.len() <= MAX_CELLS {
-        for k in order {
-            let cell = neighbours.cell(ids[k]);
-            svg.polygon(cell.into_iter().map(|[x, y]| axes.place((x, y))), color(ids[k]));
-        }
-        return;
+impl Frame<'_> {
+    /// The value that colours a particle.
+    fn value(&self, p: usize) -> Option<f64> {
+        self.colouring?.values.get(p).copied()
     }
-    let depth = |k: usize| dot(&scene.directions.toward, &snapshot.points[ids[k]]);
-    order.sort_by(|&a, &b| depth(a).total_cmp(&depth(b)));
-    let scale = axes.size.0 / (axes.x.1 - axes.x.0);
-    for k in order {
-        let at = axes.place(scene.directions.project(&snapshot.points[ids[k]]));
-        let rim = if snapshot.background.dimension == 3 { GREY } else { color(ids[k]) };
-        svg.disc(at, (RADIUS * neighbours.diameter(ids[k]) * scale).max(0.7), color(ids[k]), rim);
+
+    /// Draws the particles: cells in the plane, discs in space. The disc nearest to the eye is drawn last.
+    fn bodies(&self, svg: &mut Svg, axes: &Axes, (low, high): (f64, f64)) {
+        let Self { snapshot, scene: Scene { directions, .. }, ids, .. } = self;
+        let part = |p: usize| self.value(p).map(|value| (value - low) / (high - low));
+        let color = |p: usize| part(p).map_or_else(|| BLUE.to_owned(), viridis);
+        let neighbours = Neighbours::new(snapshot, ids);
+        let finite = |p: &usize| snapshot.points[*p].iter().all(|x| x.is_finite());
+        let mut order: Vec<usize> = ids.iter().copied().filter(finite).collect();
+        if snapshot.background.dimension == 2 && directions.plane() == Some([0, 1]) && ids.len() <= MAX_CELLS {
+            for p in order {
+                let cell = neighbours.cell(p);
+                svg.polygon(cell.iter().map(|corner| axes.place((corner[0], corner[1]))), &color(p));
+            }
+            return;
+        }
+        let depth = |p: usize| directions.depth(snapshot.points[p]);
+        order.sort_by(|&a, &b| depth(a).total_cmp(&depth(b)));
+        let scale = axes.size.0 / (axes.x.1 - axes.x.0);
+        for p in order {
+            let at = axes.place(directions.project(snapshot.points[p]));
+            let color = color(p);
+            let rim = if snapshot.background.dimension == 3 { GREY } else { &color };
+            svg.disc(at, (RADIUS * neighbours.diameter(p) * scale).max(0.7), &color, rim);
+        }
+    }
+
+    /// The picture in one dimension: the field over x.
+    fn over_x(&self, heading: &Heading) -> String {
+        let (x, _) = self.scene.window(self.snapshot);
+        let y = range([self.scene.span.0, self.scene.span.1].into_iter(), 0.05);
+        let ticks = [Ticks::new(x, 10, false), Ticks::new(y, 7, false)];
+        let (left, size) = (Axes::left(&ticks[1]), (MAX_WIDTH, MAX_WIDTH / 2.0));
+        let mut svg = heading.picture(left + size.0 + 24.0, Heading::HEIGHT + size.1 + BELOW);
+        let axes = Axes { corner: (left, Heading::HEIGHT), size, x, y };
+        let label = self.colouring.map_or("", |one| &one.label);
+        axes.draw(&mut svg, [&ticks[0], &ticks[1]], ["x", label], true);
+        for &p in &self.ids {
+            let at = (self.snapshot.points[p][0], self.value(p).unwrap_or(0.0));
+            if at.0.is_finite() && at.1.is_finite() {
+                svg.disc(axes.place(at), 2.5, BLUE, BLUE);
+            }
+        }
+        svg.finish()
     }
 }
 
@@ -260,7 +283,7 @@ fn colour_bar(svg: &mut Svg, axes: &Axes, (low, high): (f64, f64), ticks: &Ticks
         let (from, to) = (k as f64 / STEPS as f64, (k + 1) as f64 / STEPS as f64);
         let corners =
             [(left, height(from)), (left + 16.0, height(from)), (left + 16.0, height(to)), (left, height(to))];
-        svg.polygon(corners, viridis((from + to) / 2.0));
+        svg.polygon(corners, &viridis((from + to) / 2.0));
     }
     for &at in &ticks.at {
         let y = height((at - low) / (high - low));
@@ -274,41 +297,13 @@ fn colour_bar(svg: &mut Svg, axes: &Axes, (low, high): (f64, f64), ticks: &Ticks
     svg.text(at, Anchor::Upright, LABEL, BLACK, &name);
 }
 
-/// The picture in one dimension: the field over x.
-fn over_x(
-    snapshot: &Snapshot,
-    scene: &Scene,
-    heading: &Heading,
-    ids: &[usize],
-    colouring: Option<&Colouring>,
-) -> String {
-    let (x, _) = scene.window(snapshot);
-    let y = range([scene.span.0, scene.span.1].into_iter(), 0.05);
-    let ticks = [Ticks::new(x, 10, false), Ticks::new(y, 7, false)];
-    let (left, size) = (Axes::left(&ticks[1]), (MAX_WIDTH, MAX_WIDTH / 2.0));
-    let wide = left + size.0 + 24.0;
-    let mut svg = Svg::new(wide, Heading::HEIGHT + size.1 + TICK_LABELS + AXIS_NAME + 8.0);
-    heading.draw(&mut svg, wide);
-    let axes = Axes { corner: (left, Heading::HEIGHT), size, x, y };
-    let label = colouring.map_or("", |one| &one.label);
-    axes.draw(&mut svg, [&ticks[0], &ticks[1]], ["x", label], true);
-    for &p in ids {
-        let value = colouring.and_then(|one| one.values.get(p).copied()).unwrap_or(0.0);
-        let at = (snapshot.points[p][0], value);
-        if at.0.is_finite() && at.1.is_finite() {
-            svg.disc(axes.place(at), 2.5, BLUE, BLUE);
-        }
-    }
-    svg.finish()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::output::plot::PlotError;
+    use crate::output::OutputError;
     use crate::output::plot::png::texts;
     use crate::output::plot::view::View;
-    use crate::output::vtu::{Array, Background, Values};
+    use crate::output::vtu::{Array, Background};
 
     /// A lattice of particles in a grid of 4 cells along each axis, with the origin `from` on each axis. The stress grows with the number
     /// of the particle.
@@ -318,13 +313,13 @@ mod tests {
             let axis = |k: u32| if k < dimension { from + 0.75 + 0.5 * (p / 4_usize.pow(k) % 4) as f64 } else { 0.0 };
             [axis(0), axis(1), axis(2)]
         };
-        let values = Values::Float((0..count).map(|p| 1e7 * p as f64).collect());
-        let array = Array { name: "von_mises".into(), components: vec!["".into()], values };
+        let values = (0..count).map(|p| 1e7 * p as f64).collect();
+        let array = Array { name: "von_mises".into(), components: vec!["".into()], values, is_index: false };
         let background = Background { dimension, origin: [from; 3], spacing: 1.0, cells: [4; 3] };
         Snapshot { time: 0.1 + 0.2, background, points: (0..count).map(place).collect(), arrays: vec![array] }
     }
 
-    fn picture(snapshot: &Snapshot, view: Option<View>) -> Result<String, PlotError> {
+    fn picture(snapshot: &Snapshot, view: Option<View>) -> Result<String, OutputError> {
         let colouring = Colouring::chosen(snapshot, None)?;
         let end = |start: f64, pick: fn(f64, f64) -> f64| -> [f64; 3] {
             std::array::from_fn(|axis| snapshot.points.iter().map(|x| x[axis]).fold(start, pick))
@@ -339,7 +334,7 @@ mod tests {
     }
 
     #[test]
-    fn no_text_of_a_picture_is_cut_or_covers_another() -> Result<(), PlotError> {
+    fn no_text_of_a_picture_is_cut_or_covers_another() -> Result<(), OutputError> {
         let views = ["xy", "zy", "30,20", "-60,35", "xz,120,-40"].map(|view| view.parse().ok());
         for (dimension, view, from) in [(1, None, 0.0), (2, None, -1e4), (3, None, 0.0)]
             .into_iter()
@@ -359,7 +354,7 @@ mod tests {
     }
 
     #[test]
-    fn a_body_in_the_plane_is_filled_with_cells_and_one_in_space_with_discs() -> Result<(), PlotError> {
+    fn a_body_in_the_plane_is_filled_with_cells_and_one_in_space_with_discs() -> Result<(), OutputError> {
         let count = |svg: &str, kind: &str| svg.matches(kind).count();
         let (plane, space) = (picture(&lattice(2, 0.0), None)?, picture(&lattice(3, 0.0), None)?);
         // The colour bar has 128 polygons.

@@ -1,15 +1,16 @@
 //! The snapshots of a run for `player.js`: one block of 16-bit numbers, and JSON with the place of every channel in the block.
 
+use super::axes::extremes;
 use super::colouring::words;
-use super::error::PlotError;
 use super::neighbours::Neighbours;
 use super::palette::VIRIDIS;
-use super::series::damaged;
-use crate::output::vtu::{Array, Background, Snapshot, Values};
+use crate::output::OutputError;
+use crate::output::history::AXES;
+use crate::output::vtu::{Array, Background, Snapshot};
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use serde_json::{Value, json};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Largest number of values on a page: 20 MB, and 27 MB as base64.
 const MOST: usize = 10_000_000;
@@ -19,9 +20,6 @@ const MOST_SNAPSHOTS: usize = 100;
 
 /// Code of a value that is not finite. Finite values have the codes 0 to 65534.
 const NONE: u16 = u16::MAX;
-
-/// Axis names of components.
-const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// The data of a page for the player.
 pub(super) struct Played {
@@ -48,21 +46,14 @@ struct Channel {
 impl Channel {
     /// Smallest and largest finite value; 0 if there is none.
     fn range(&self) -> (f64, f64) {
-        let finite = self.values.iter().filter(|x| x.is_finite());
-        let range = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &x| (low.min(x), high.max(x)));
-        if range.0 <= range.1 { range } else { (0.0, 0.0) }
-    }
-
-    /// Whether all values are finite and equal.
-    fn is_constant(&self) -> bool {
-        let (low, high) = self.range();
-        low == high && self.values.iter().all(|x| x.is_finite())
+        let (low, high) = extremes(self.values.iter().copied());
+        if low <= high { (low, high) } else { (0.0, 0.0) }
     }
 }
 
 /// The snapshots of a run, or an even sample of them.
 pub(super) struct Recording {
-    background: Background,
+    pub(super) background: Background,
     times: Vec<f64>,
     /// Number of all snapshots, and of all particles.
     snapshots: usize,
@@ -77,12 +68,11 @@ pub(super) struct Recording {
 
 impl Recording {
     /// Reads the snapshots in `files`; `None` if there are no files.
-    pub(super) fn read(files: &[PathBuf]) -> Result<Option<Self>, PlotError> {
+    pub(super) fn read(files: &[PathBuf]) -> Result<Option<Self>, OutputError> {
         let Some(path) = files.first() else { return Ok(None) };
         let first = Snapshot::read(path)?;
         let particles = first.points.len();
-        let numbers =
-            3 + first.arrays.iter().filter(|array| is_coloured(array)).map(|a| a.components.len()).sum::<usize>();
+        let numbers = 3 + coloured(&first).map(|array| array.components.len()).sum::<usize>();
         let too_many = files.len().saturating_mul(particles).saturating_mul(numbers) > MOST;
         let snapshots = if too_many { files.len().min(MOST_SNAPSHOTS) } else { files.len() };
         let ids = sample(particles, MOST / (numbers * snapshots));
@@ -97,40 +87,46 @@ impl Recording {
         };
         for k in 0..snapshots {
             // The first, the last, and evenly between them.
-            let path = &files[k * (files.len() - 1) / (snapshots - 1).max(1)];
-            let snapshot = Snapshot::read(path)?;
-            let shape =
-                |s: &Snapshot| s.arrays.iter().map(|a| (a.name.clone(), a.components.len())).collect::<Vec<_>>();
-            if snapshot.points.len() != particles || shape(&snapshot) != shape(&first) {
-                return Err(damaged(path, "it has other particles or fields than the first"));
-            }
-            recording.times.push(snapshot.time);
-            for (axis, x) in
-                snapshot.points.iter().flat_map(|point| point.iter().enumerate()).filter(|(_, x)| x.is_finite())
-            {
-                recording.bounds[0][axis] = recording.bounds[0][axis].min(*x);
-                recording.bounds[1][axis] = recording.bounds[1][axis].max(*x);
-            }
-            let (_, moving) = recording.channels.split_at_mut(RESTING);
-            let (displacements, written) = moving.split_at_mut(3);
-            for (axis, channel) in displacements.iter_mut().enumerate() {
-                channel.values.extend(ids.iter().map(|&p| snapshot.points[p][axis] - first.points[p][axis]));
-            }
-            let mut written = written.iter_mut();
-            for array in snapshot.arrays.iter().filter(|array| is_coloured(array)) {
-                let width = array.components.len();
-                for (component, channel) in (0..width).zip(written.by_ref()) {
-                    channel.values.extend(ids.iter().map(|&p| number(array, p * width + component)));
-                }
-            }
+            recording.add(&first, &files[k * (files.len() - 1) / (snapshots - 1).max(1)], &ids)?;
         }
         Ok(Some(recording))
     }
 
-    /// The largest displacement along each axis.
-    pub(super) fn motion(&self) -> [f64; 3] {
+    /// Adds the snapshot in the file `path` of a run that begins with `first`.
+    fn add(&mut self, first: &Snapshot, path: &Path, ids: &[usize]) -> Result<(), OutputError> {
+        let snapshot = Snapshot::read(path)?;
+        let shape = |s: &Snapshot| s.arrays.iter().map(|a| (a.name.clone(), a.components.len())).collect::<Vec<_>>();
+        if snapshot.points.len() != first.points.len() || shape(&snapshot) != shape(first) {
+            return Err(OutputError::content(path, "has other particles or fields than the first snapshot of the run"));
+        }
+        self.times.push(snapshot.time);
+        for axis in 0..3 {
+            let (low, high) = extremes(snapshot.points.iter().map(|point| point[axis]));
+            self.bounds[0][axis] = self.bounds[0][axis].min(low);
+            self.bounds[1][axis] = self.bounds[1][axis].max(high);
+        }
+        let moved = |axis: usize| ids.iter().map(|&p| snapshot.points[p][axis] - first.points[p][axis]).collect();
+        let written = coloured(&snapshot).flat_map(|array| {
+            let width = array.components.len();
+            (0..width).map(move |component| ids.iter().map(|&p| array.values[p * width + component]).collect())
+        });
+        let added: Vec<Vec<f64>> = (0..3).map(moved).chain(written).collect();
+        for (channel, values) in self.channels[RESTING..].iter_mut().zip(added) {
+            channel.values.extend(values);
+        }
+        Ok(())
+    }
+
+    /// Horizontal and vertical axis of the pictures.
+    ///
+    /// The direction of sight is the axis with the least motion: a ball that falls along y is not drawn on the x–z plane. If several axes
+    /// have the least motion, up to a tenth, the last of them is taken.
+    pub(super) fn plane(&self) -> [usize; 2] {
+        if self.background.dimension < 3 {
+            return [0, 1];
+        }
         let largest = |channel: &Channel| channel.values.iter().fold(0.0, |most: f64, u| most.max(u.abs()));
-        std::array::from_fn(|axis| self.channels.get(RESTING + axis).map_or(0.0, largest))
+        plane_of([0, 1, 2].map(|axis| largest(&self.channels[RESTING + axis])))
     }
 
     /// Lower and upper corner of a box around all particles at all times.
@@ -141,16 +137,19 @@ impl Recording {
     }
 
     /// The data for `player.js`, with the axes of the picture.
-    pub(super) fn page(&self, [right, up]: [usize; 2]) -> Played {
-        let (mut numbers, mut list): (Vec<u8>, Vec<Value>) = (Vec::new(), Vec::new());
+    pub(super) fn page(&self) -> Played {
+        let [right, up] = self.plane();
+        let mut numbers: Vec<u8> = Vec::new();
+        let mut list: Vec<Value> = Vec::new();
         for channel in &self.channels {
             let (low, high) = channel.range();
+            let Channel { field, component, values } = channel;
+            let is_constant = low == high && values.iter().all(|x| x.is_finite());
             // Start of the channel, counted in 16-bit numbers.
-            let start = (!channel.is_constant()).then_some(numbers.len() / 2);
-            if start.is_some() {
-                numbers.extend(channel.values.iter().flat_map(|&x| quantized(x, low, high).to_le_bytes()));
+            let start = (!is_constant).then_some(numbers.len() / 2);
+            if !is_constant {
+                numbers.extend(values.iter().flat_map(|&x| quantized(x, low, high).to_le_bytes()));
             }
-            let Channel { field, component, .. } = channel;
             list.push(json!({ "field": field, "component": component, "low": low, "high": high, "start": start }));
         }
         let Background { dimension, origin, spacing, cells } = self.background;
@@ -168,26 +167,27 @@ impl Recording {
 
     /// A note on data left out to keep the page small.
     fn note(&self) -> Option<String> {
-        let part = |shown: usize, of: usize, what: &str| (shown < of).then(|| format!("{shown} of {of} {what}"));
-        let parts =
-            [part(self.shown, self.particles, "particles"), part(self.times.len(), self.snapshots, "snapshots")];
-        let parts: Vec<String> = parts.into_iter().flatten().collect();
-        (!parts.is_empty())
-            .then(|| format!("The page shows {}, evenly chosen; the files have all.", parts.join(" and ")))
+        let counts = [(self.shown, self.particles, "particles"), (self.times.len(), self.snapshots, "snapshots")];
+        let parts = counts.into_iter().filter(|(shown, of, _)| shown < of);
+        let parts: Vec<String> = parts.map(|(shown, of, what)| format!("{shown} of {of} {what}")).collect();
+        let note = || format!("The page shows {}, evenly chosen; the files have all.", parts.join(" and "));
+        (!parts.is_empty()).then(note)
     }
 }
 
-/// Whether the player needs the array. Displacements follow from the positions.
-fn is_coloured(array: &Array) -> bool {
-    array.name != "displacement"
+/// The plane on which a motion is best seen, with the largest displacements `motion` along the axes.
+fn plane_of(motion: [f64; 3]) -> [usize; 2] {
+    let least = 1.1 * motion.iter().fold(f64::INFINITY, |a, &b| a.min(b));
+    match motion.map(|u| u <= least) {
+        [_, _, true] => [0, 1],
+        [_, true, _] => [0, 2],
+        _ => [1, 2],
+    }
 }
 
-fn number(array: &Array, place: usize) -> f64 {
-    let found = match &array.values {
-        Values::Float(values) => values.get(place).copied(),
-        Values::Index(values) => values.get(place).map(|&x| f64::from(x)),
-    };
-    found.unwrap_or(f64::NAN)
+/// The arrays that the player needs. Displacements follow from the positions.
+fn coloured(snapshot: &Snapshot) -> impl Iterator<Item = &Array> {
+    snapshot.arrays.iter().filter(|array| array.name != "displacement")
 }
 
 /// The channels of a run that begins with `first`. Positions and distances are filled, other channels are empty.
@@ -199,8 +199,8 @@ fn channels(first: &Snapshot, ids: &[usize]) -> Vec<Channel> {
     });
     let distances = channel("distance of neighbours", "", Neighbours::new(first, ids).distances(ids));
     let displacement = AXES.iter().map(|name| channel("displacement", name, Vec::new()));
-    let coloured = first.arrays.iter().filter(|array| is_coloured(array));
-    let written = coloured.flat_map(|array| array.components.iter().map(|name| channel(&array.name, name, Vec::new())));
+    let written =
+        coloured(first).flat_map(|array| array.components.iter().map(|name| channel(&array.name, name, Vec::new())));
     rest.chain([distances]).chain(displacement).chain(written).collect()
 }
 
@@ -220,6 +220,13 @@ fn quantized(x: f64, low: f64, high: f64) -> u16 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn motion_is_seen_from_the_side() {
+        // a ball that falls along y, one along z, a bar drawn out along x; a beam along y that bends towards z; nothing moves
+        let motions = [[0.1, 2.0, 0.1000001], [0.1, 0.1, 2.0], [1.0, 0.3, 0.3], [0.0, 1.0, 3.0], [0.0; 3]];
+        assert_eq!(motions.map(|motion| plane_of(motion)), [[0, 1], [0, 2], [0, 1], [1, 2], [0, 1]]);
+    }
 
     #[test]
     fn numbers_come_back_to_half_a_step_and_what_is_none_stays_none() {

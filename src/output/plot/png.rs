@@ -1,6 +1,6 @@
 //! PNG from SVG.
 
-use super::error::PlotError;
+use crate::output::OutputError;
 use resvg::{tiny_skia, usvg};
 
 /// Pixels per unit of the SVG.
@@ -17,13 +17,13 @@ const FAMILY: &str = "DejaVu Sans";
 /// let png = from_svg("a square", r#"<svg xmlns="http://www.w3.org/2000/svg" width="30" height="20"/>"#)?;
 /// // Width and height stand in the first chunk, at two pixels to a unit.
 /// assert_eq!((&png[..4], &png[16..24]), (b"\x89PNG".as_slice(), [0, 0, 0, 60, 0, 0, 0, 40].as_slice()));
-/// # Ok::<(), bfree::output::plot::PlotError>(())
+/// # Ok::<(), bfree::output::OutputError>(())
 /// ```
 ///
 /// # Errors
 /// The SVG cannot be read or drawn.
-pub fn from_svg(name: &'static str, svg: &str) -> Result<Vec<u8>, PlotError> {
-    let fail = |reason: String| PlotError::Draw { name, reason };
+pub fn from_svg(name: &'static str, svg: &str) -> Result<Vec<u8>, OutputError> {
+    let fail = |reason: String| OutputError::Draw { name, reason };
     let tree = tree(name, svg)?;
     let size = tree.size().to_int_size();
     let pixels = |length: u32| (length as f32 * SCALE) as u32;
@@ -34,12 +34,12 @@ pub fn from_svg(name: &'static str, svg: &str) -> Result<Vec<u8>, PlotError> {
     pixmap.encode_png().map_err(|error| fail(error.to_string()))
 }
 
-fn tree(name: &'static str, svg: &str) -> Result<usvg::Tree, PlotError> {
+fn tree(name: &'static str, svg: &str) -> Result<usvg::Tree, OutputError> {
     let mut options = usvg::Options::default();
     let fonts = options.fontdb_mut();
     fonts.load_font_data(dejavu::sans::regular().to_vec());
     fonts.set_sans_serif_family(FAMILY);
-    usvg::Tree::from_str(svg, &options).map_err(|error| PlotError::Draw { name, reason: error.to_string() })
+    usvg::Tree::from_str(svg, &options).map_err(|error| OutputError::Draw { name, reason: error.to_string() })
 }
 
 /// Extent of a text.
@@ -66,7 +66,7 @@ type Size = (f64, f64);
 
 /// The size of a picture, and its texts.
 #[cfg(test)]
-pub(super) fn texts(svg: &str) -> Result<(Size, Vec<(String, Extent)>), PlotError> {
+pub(super) fn texts(svg: &str) -> Result<(Size, Vec<(String, Extent)>), OutputError> {
     let tree = tree("texts", svg)?;
     let text = |node: &usvg::Node| match node {
         usvg::Node::Text(text) => {

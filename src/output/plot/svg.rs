@@ -1,9 +1,7 @@
 //! The few elements of SVG that pictures need, with coordinates to a hundredth of a unit.
 
-use super::palette::Color;
 use skrifa::instance::{LocationRef, Size};
 use skrifa::{FontRef, MetadataProvider};
-use std::fmt::Write as _;
 
 /// A point of a picture: to the right and down from its upper left corner.
 pub(super) type Point = (f64, f64);
@@ -31,30 +29,29 @@ impl Svg {
     }
 
     /// A line through `points`.
-    pub(super) fn line(&mut self, points: impl IntoIterator<Item = Point>, color: Color, width: f64) {
+    pub(super) fn line(&mut self, points: impl IntoIterator<Item = Point>, color: &str, width: f64) {
         let points = listed(points);
-        self.push(format_args!(
-            "<polyline points=\"{points}\" fill=\"none\" stroke=\"{color}\" stroke-width=\"{width}\" stroke-linejoin=\"round\"/>"
-        ));
+        self.body += &format!(
+            "<polyline points=\"{points}\" fill=\"none\" stroke=\"{color}\" stroke-width=\"{width}\" stroke-linejoin=\"round\"/>\n"
+        );
     }
 
     /// A filled polygon. Its rim has the same colour, so that neighbours leave no seam.
-    pub(super) fn polygon(&mut self, points: impl IntoIterator<Item = Point>, color: Color) {
+    pub(super) fn polygon(&mut self, points: impl IntoIterator<Item = Point>, color: &str) {
         let points = listed(points);
-        self.push(format_args!(
-            "<polygon points=\"{points}\" fill=\"{color}\" stroke=\"{color}\" stroke-width=\"0.5\"/>"
-        ));
+        self.body +=
+            &format!("<polygon points=\"{points}\" fill=\"{color}\" stroke=\"{color}\" stroke-width=\"0.5\"/>\n");
     }
 
     /// A disc with a rim.
-    pub(super) fn disc(&mut self, (x, y): Point, radius: f64, color: Color, rim: Color) {
-        self.push(format_args!(
-            "<circle cx=\"{x:.2}\" cy=\"{y:.2}\" r=\"{radius:.2}\" fill=\"{color}\" stroke=\"{rim}\" stroke-width=\"0.4\"/>"
-        ));
+    pub(super) fn disc(&mut self, (x, y): Point, radius: f64, color: &str, rim: &str) {
+        self.body += &format!(
+            "<circle cx=\"{x:.2}\" cy=\"{y:.2}\" r=\"{radius:.2}\" fill=\"{color}\" stroke=\"{rim}\" stroke-width=\"0.4\"/>\n"
+        );
     }
 
     /// A text with the font size `size`. The point lies on the base line.
-    pub(super) fn text(&mut self, (x, y): Point, anchor: Anchor, size: f64, color: Color, text: &str) {
+    pub(super) fn text(&mut self, (x, y): Point, anchor: Anchor, size: f64, color: &str, text: &str) {
         let (place, turned) = match anchor {
             Anchor::Start => ("start", String::new()),
             Anchor::Middle => ("middle", String::new()),
@@ -62,19 +59,14 @@ impl Svg {
             Anchor::Upright => ("middle", format!(" transform=\"rotate(-90 {x:.2} {y:.2})\"")),
         };
         let text = escaped(text);
-        self.push(format_args!(
-            "<text x=\"{x:.2}\" y=\"{y:.2}\" font-size=\"{size}\" text-anchor=\"{place}\" fill=\"{color}\"{turned}>{text}</text>"
-        ));
-    }
-
-    fn push(&mut self, element: std::fmt::Arguments<'_>) {
-        // Writing to a string cannot fail.
-        let _ = writeln!(self.body, "{element}");
+        self.body += &format!(
+            "<text x=\"{x:.2}\" y=\"{y:.2}\" font-size=\"{size}\" text-anchor=\"{place}\" fill=\"{color}\"{turned}>{text}</text>\n"
+        );
     }
 
     /// The content of the SVG file.
     pub(super) fn finish(self) -> String {
-        let ((width, height), body) = (self.size, self.body);
+        let Self { size: (width, height), body } = self;
         format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width:.0}\" height=\"{height:.0}\" viewBox=\"0 0 {width:.0} {height:.0}\" \
              font-family=\"DejaVu Sans, Verdana, sans-serif\">\n<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n{body}</svg>\n"
@@ -83,17 +75,12 @@ impl Svg {
 }
 
 fn listed(points: impl IntoIterator<Item = Point>) -> String {
-    let mut list = String::new();
-    for (x, y) in points {
-        // Writing to a string cannot fail.
-        let _ = write!(list, "{x:.2},{y:.2} ");
-    }
-    list
+    points.into_iter().map(|(x, y)| format!("{x:.2},{y:.2} ")).collect()
 }
 
-/// A text escaped for XML, without control characters, which XML forbids.
-fn escaped(text: &str) -> String {
-    let text: String = text.chars().filter(|letter| !letter.is_control()).collect();
+/// A text escaped for XML and HTML, without control characters, which XML forbids. A line break counts as a space there.
+pub(super) fn escaped(text: &str) -> String {
+    let text = text.replace(|letter: char| letter.is_control() && letter != '\n', "");
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 

@@ -1,35 +1,35 @@
 //! Columns of numbers from a table written by this crate.
 
-use super::error::PlotError;
+use crate::output::OutputError;
 use std::path::PathBuf;
 
 /// A table in memory.
 pub(super) struct Columns {
     path: PathBuf,
-    names: Vec<String>,
+    /// The names of all columns.
+    pub(super) names: Vec<String>,
     /// Cells, row by row.
     cells: Vec<f64>,
 }
 
 impl Columns {
     /// Reads a table. An incomplete last line, as a killed run may leave it, is dropped.
-    pub(super) fn read(path: PathBuf) -> Result<Self, PlotError> {
-        let text = match std::fs::read_to_string(&path) {
-            Ok(text) => text,
-            Err(source) => return Err(PlotError::Read { path, source }),
-        };
+    pub(super) fn read(path: PathBuf) -> Result<Self, OutputError> {
+        let text = std::fs::read_to_string(&path).map_err(OutputError::io("read", &path))?;
         // After the last line break there is nothing, or an incomplete line.
         let whole = text.rsplit_once('\n').map_or("", |(whole, _)| whole);
         let mut lines = whole.lines();
-        let names: Vec<String> = names(lines.next().unwrap_or_default());
+        let names = names(lines.next().unwrap_or_default());
         let mut cells = Vec::new();
         for (k, line) in lines.enumerate() {
-            let damaged = |cell: &str| PlotError::Cell { path: path.clone(), line: k + 2, cell: cell.to_owned() };
             for cell in line.split(',') {
-                cells.push(cell.parse().map_err(|_| damaged(cell))?);
+                let wrong =
+                    |_| OutputError::content(&path, format!("has {cell:?} in line {}, which is not a number", k + 2));
+                cells.push(cell.parse().map_err(wrong)?);
             }
             if cells.len() != (k + 1) * names.len() {
-                return Err(damaged(line));
+                let what = format!("has another number of cells in line {} than columns: {line:?}", k + 2);
+                return Err(OutputError::content(&path, what));
             }
         }
         Ok(Self { path, names, cells })
@@ -40,16 +40,11 @@ impl Columns {
         self.names.iter().any(|name| name == column)
     }
 
-    /// The names of all columns.
-    pub(super) fn names(&self) -> &[String] {
-        &self.names
-    }
-
     /// The pairs (x, y) of two columns.
-    pub(super) fn pairs(&self, x: &str, y: &str) -> Result<Vec<(f64, f64)>, PlotError> {
+    pub(super) fn pairs(&self, x: &str, y: &str) -> Result<Vec<(f64, f64)>, OutputError> {
         let find = |column: &str| {
             let place = self.names.iter().position(|name| name == column);
-            place.ok_or_else(|| PlotError::Column { path: self.path.clone(), column: column.to_owned() })
+            place.ok_or_else(|| OutputError::content(&self.path, format!("has no column {column:?}")))
         };
         let (x, y) = (find(x)?, find(y)?);
         Ok(self.cells.chunks(self.names.len()).map(|row| (row[x], row[y])).collect())

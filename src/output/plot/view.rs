@@ -1,5 +1,6 @@
 //! Direction of sight.
 
+use crate::tensor::Vector;
 use std::str::FromStr;
 
 /// A direction of sight, written `xy`, `30,20` or `xz,30,20`: the plane of the picture, then two angles in degrees. The eye moves by these
@@ -48,9 +49,9 @@ impl FromStr for View {
 /// Unit vectors of a picture: to the right, up, and towards the eye.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Directions {
-    pub right: [f64; 3],
-    pub up: [f64; 3],
-    pub toward: [f64; 3],
+    right: Vector<f64, 3>,
+    up: Vector<f64, 3>,
+    toward: Vector<f64, 3>,
 }
 
 impl Directions {
@@ -59,36 +60,34 @@ impl Directions {
     pub(super) fn new(view: Option<View>, dimension: u32, moves: [usize; 2]) -> Self {
         let standard = if dimension == 3 { (30.0, 20.0) } else { (0.0, 0.0) };
         let view = view.unwrap_or(View { plane: None, azimuth: standard.0, elevation: standard.1 });
-        let [right, up] =
-            view.plane.unwrap_or(moves).map(|axis| std::array::from_fn(|k| f64::from(u8::from(k == axis))));
-        let toward = cross(right, up);
-        let ((sa, ca), (se, ce)) = (view.azimuth.to_radians().sin_cos(), view.elevation.to_radians().sin_cos());
-        let level = sum(ca, toward, sa, right);
-        Self { right: sum(ca, right, -sa, toward), up: sum(ce, up, -se, level), toward: sum(ce, level, se, up) }
+        let unit = |axis: usize| Vector::from_fn(|k, _| f64::from(u8::from(k == axis)));
+        let [right, up]: [Vector<f64, 3>; 2] = view.plane.unwrap_or(moves).map(unit);
+        let toward = right.cross(&up);
+        let (sin_azimuth, cos_azimuth) = view.azimuth.to_radians().sin_cos();
+        let (sin_elevation, cos_elevation) = view.elevation.to_radians().sin_cos();
+        let level = cos_azimuth * toward + sin_azimuth * right;
+        Self {
+            right: cos_azimuth * right - sin_azimuth * toward,
+            up: cos_elevation * up - sin_elevation * level,
+            toward: cos_elevation * level + sin_elevation * up,
+        }
     }
 
     /// Position of a point in the picture.
-    pub(super) fn project(&self, x: &[f64; 3]) -> (f64, f64) {
-        (dot(&self.right, x), dot(&self.up, x))
+    pub(super) fn project(&self, x: [f64; 3]) -> (f64, f64) {
+        (self.right.dot(&Vector::from(x)), self.up.dot(&Vector::from(x)))
+    }
+
+    /// Distance of a point towards the eye.
+    pub(super) fn depth(&self, x: [f64; 3]) -> f64 {
+        self.toward.dot(&Vector::from(x))
     }
 
     /// Numbers of the axes to the right and up, if the picture lies in a plane of two axes.
     pub(super) fn plane(&self) -> Option<[usize; 2]> {
-        let axis = |direction: &[f64; 3]| direction.iter().position(|x| (x - 1.0).abs() < 1e-12);
+        let axis = |direction: &Vector<f64, 3>| direction.iter().position(|x| (x - 1.0).abs() < 1e-12);
         Some([axis(&self.right)?, axis(&self.up)?])
     }
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-pub(super) fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn sum(s: f64, a: [f64; 3], t: f64, b: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|k| s * a[k] + t * b[k])
 }
 
 #[cfg(test)]
@@ -102,9 +101,9 @@ mod tests {
         // From the right, x comes towards the eye; from above, y does.
         for (view, towards) in [("90,0", [1.0, 0.0, 0.0]), ("0,90", [0.0, 1.0, 0.0])] {
             let directions = of(view)?;
-            assert!(dot(&directions.toward, &towards) > 1.0 - 1e-12, "{view}: {directions:?}");
+            assert!(directions.depth(towards) > 1.0 - 1e-12, "{view}: {directions:?}");
             let [a, b, c] = [directions.right, directions.up, directions.toward];
-            assert!(dot(&a, &b).abs() + dot(&b, &c).abs() + dot(&c, &a).abs() < 1e-12);
+            assert!(a.dot(&b).abs() + b.dot(&c).abs() + c.dot(&a).abs() < 1e-12);
         }
         Ok(())
     }

@@ -1,15 +1,15 @@
 //! The messages of a run and of `bfree check`: the report, the history, progress, warnings.
 
-use super::{program, rebound, report, scene};
-use crate::support::Failure;
+use super::{check, program, rebound, report, run, scene};
+use crate::support::{Failure, merged, said, solid};
 use serde_json::{Value, json};
 
 #[test]
 fn check_says_how_far_apart_bodies_feel_each_other() -> Result<(), Failure> {
     let check = |set: &str| -> Result<String, Failure> {
-        let output = program().arg("check").arg(scene("collision.json")).args(["--set", set]).output()?;
-        assert!(output.status.success() && output.stderr.is_empty(), "{}", String::from_utf8(output.stderr)?);
-        Ok(String::from_utf8(output.stdout)?)
+        let (code, text, told) = check(&scene("collision.json"), &[set])?;
+        assert!(code == Some(0) && told.is_empty(), "{told}");
+        Ok(text)
     };
     assert!(check("approximation=\"linear\"")?.contains("0.1000 to 0.3500 apart (0.4 to 1.4 spacings)"));
     assert!(check("approximation={\"lme\": {\"gamma\": 2}}")?.contains("how far was not measured"));
@@ -19,15 +19,8 @@ fn check_says_how_far_apart_bodies_feel_each_other() -> Result<(), Failure> {
 #[test]
 fn load_steps_have_no_balance() -> Result<(), Failure> {
     let directory = tempfile::tempdir()?;
-    let out = directory.path().join("run");
-    let status = program()
-        .arg("run")
-        .arg(scene("column_static.json"))
-        .args(["--steps", "1", "--quiet", "--out"])
-        .arg(&out)
-        .status()?;
-    assert!(status.success());
-    let history = std::fs::read_to_string(out.join("history.csv"))?;
+    assert_eq!(run(&scene("column_static.json"), directory.path(), &["--steps", "1", "--quiet"])?.0, Some(0));
+    let history = std::fs::read_to_string(directory.path().join("history.csv"))?;
     let columns: Vec<&str> = history.lines().next().unwrap_or_default().split(',').collect();
     assert!(columns.contains(&"strain") && !columns.contains(&"balance"), "{columns:?}");
     assert_eq!(history.lines().last().map(|row| row.split(',').count()), Some(columns.len()));
@@ -39,15 +32,11 @@ fn the_report_says_what_was_asked_for() -> Result<(), Failure> {
     let directory = tempfile::tempdir()?;
     let far = r#"output.probes=[{"name": "far", "field": "velocity", "at": {"point": [14, 4]}},
                                {"name": "near", "field": "velocity", "at": {"particle": [2.5, 2.5]}}]"#;
-    let arguments =
-        ["--set", far, "--until", "0.3", "--steps", "4", "--threads", "1", "--check-tangent", "3", "--quiet"];
-    let output = rebound(directory.path(), &arguments)?;
-    let message = String::from_utf8(output.stderr)?;
-    assert!(output.status.success(), "{message}");
-    assert!(
-        message.starts_with("warning: probe \"far\": the nearest particle") && message.contains("spacing 2.500e-1;"),
-        "{message}"
-    );
+    let limits = ["--until", "0.3", "--steps", "4", "--threads", "1", "--check-tangent", "3", "--quiet"];
+    let (code, _, message) = rebound(directory.path(), &[&["--set", far], &limits[..]].concat())?;
+    assert_eq!(code, Some(0), "{message}");
+    assert!(message.starts_with("warning: probe \"far\": the nearest particle"), "{message}");
+    assert!(message.contains("spacing 2.500e-1;"), "{message}");
     assert_eq!(message.lines().count(), 1, "{message}");
     let report = report(directory.path())?;
     let command = &report["command"];
@@ -68,21 +57,19 @@ fn the_report_says_what_was_asked_for() -> Result<(), Failure> {
 #[test]
 fn a_picture_shows_what_is_asked_for() -> Result<(), Failure> {
     let directory = tempfile::tempdir()?;
-    assert!(rebound(directory.path(), &["--until", "2", "--quiet"])?.status.success());
-    let plot = |arguments: &[&str]| program().arg("plot").arg(directory.path()).args(arguments).output();
-    let output = plot(&["--field", "stress_xx", "--time", "0.7", "--format", "svg"])?;
-    assert!(output.status.success(), "{}", String::from_utf8(output.stderr)?);
-    let drawn = String::from_utf8(output.stdout)?;
+    assert_eq!(rebound(directory.path(), &["--until", "2", "--quiet"])?.0, Some(0));
+    let plot = |arguments: &[&str]| said(program().arg("plot").arg(directory.path()).args(arguments));
+    let (code, drawn, text) = plot(&["--field", "stress_xx", "--time", "0.7", "--format", "svg"])?;
+    assert_eq!(code, Some(0), "{text}");
     assert!(drawn.contains("particles.svg") && !drawn.contains(".png"), "{drawn}");
     let picture = || std::fs::read_to_string(directory.path().join("particles.svg"));
     // Snapshots are 0.5 apart.
     assert!(picture()?.contains(">Stress xx, t = 0.5<"), "{}", picture()?);
-    assert!(plot(&[])?.status.success());
+    assert_eq!(plot(&[])?.0, Some(0));
     assert!(picture()?.contains(">Von Mises stress, t = 2<"));
-    let output = plot(&["--field", "stress_xq"])?;
-    let text = String::from_utf8(output.stderr)?;
-    assert!(output.status.code() == Some(2) && text.contains("\"stress_xq\"") && text.contains("stress_xy"), "{text}");
-    assert_eq!(plot(&["--view", "xx"])?.status.code(), Some(2));
+    let (code, _, text) = plot(&["--field", "stress_xq"])?;
+    assert!(code == Some(2) && text.contains("\"stress_xq\"") && text.contains("stress_xy"), "{text}");
+    assert_eq!(plot(&["--view", "xx"])?.0, Some(2));
     Ok(())
 }
 
@@ -90,8 +77,7 @@ fn a_picture_shows_what_is_asked_for() -> Result<(), Failure> {
 fn seconds_of_set_up_are_told_apart() -> Result<(), Failure> {
     let directory = tempfile::tempdir()?;
     // 45,000 particles are made, and no step is taken.
-    let output = rebound(directory.path(), &["--steps", "0", "--set", "grid.spacing=0.025"])?;
-    let summary = String::from_utf8(output.stdout)?;
+    let (_, summary, _) = rebound(directory.path(), &["--steps", "0", "--set", "grid.spacing=0.025"])?;
     assert!(summary.contains("seconds   set up "), "{summary}");
     let report = report(directory.path())?;
     let seconds = report["seconds"].as_object().ok_or("no seconds")?;
@@ -107,9 +93,9 @@ fn a_failed_run_reports_every_attempt_and_its_work() -> Result<(), Failure> {
     let directory = tempfile::tempdir()?;
     // One iteration is never enough, so the step is halved twice.
     let few = ["--set", "solver.newton.max_iterations=1", "--set", "time.max_halvings=2", "--steps", "400", "--quiet"];
-    let output = rebound(directory.path(), &[&few[..], &["--set", "solver.newton.tolerance=1e-14"]].concat())?;
-    let message = String::from_utf8(output.stderr)?;
-    assert_eq!(output.status.code(), Some(1), "{message}");
+    let tight = ["--set", "solver.newton.tolerance=1e-14"];
+    let (code, _, message) = rebound(directory.path(), &[&few[..], &tight].concat())?;
+    assert_eq!(code, Some(1), "{message}");
     assert_eq!(message.matches("allowed iterations").count(), 1, "{message}");
     let report = report(directory.path())?;
     let sum = |key: &str| {
@@ -135,9 +121,8 @@ fn a_program_that_watches_reads_json() -> Result<(), Failure> {
     let directory = tempfile::tempdir()?;
     let far = r#"output.probes=[{"name": "far", "field": "velocity", "at": {"point": [14, 4]}}]"#;
     let arguments = ["--progress", "json", "--until", "24", "--set", "time.lumping=0.05", "--set", far];
-    let output = rebound(directory.path(), &arguments)?;
-    let text = String::from_utf8(output.stderr)?;
-    assert!(output.status.success(), "{text}");
+    let (code, _, text) = rebound(directory.path(), &arguments)?;
+    assert_eq!(code, Some(0), "{text}");
     let lines: Vec<Value> = text.lines().map(serde_json::from_str).collect::<Result<_, _>>()?;
     assert_eq!(lines[0]["event"], "warning");
     assert!(lines[0]["message"].as_str().is_some_and(|words| words.starts_with("probe \"far\"")), "{text}");
@@ -153,27 +138,21 @@ fn a_program_that_watches_reads_json() -> Result<(), Failure> {
     let warned = lines.iter().filter(|line| line["event"] == "warning" && line["kind"].is_string()).count();
     assert_eq!(report(directory.path())?["warnings"].as_array().map(Vec::len), Some(warned));
     // The progress contains errors too.
-    let wrong = rebound(directory.path(), &["--progress", "json", "--set", "time.step=-1"])?;
-    let error: Value = serde_json::from_slice(&wrong.stderr)?;
-    assert_eq!((&error["event"], &error["code"], wrong.status.code()), (&"error".into(), &2.into(), Some(2)));
-    assert!(error["message"].as_str().is_some_and(|text| text.contains("rebound.json")), "{error}");
-    assert!(
-        error["because"].to_string().contains("time.step") || error["message"].to_string().contains("time.step"),
-        "{error}"
-    );
-    let both = rebound(directory.path(), &["--progress", "json", "--quiet"])?;
-    assert_eq!(both.status.code(), Some(2));
+    let (code, _, text) = rebound(directory.path(), &["--progress", "json", "--set", "time.step=-1"])?;
+    let error: Value = serde_json::from_str(&text)?;
+    assert_eq!((&error["event"], &error["code"], code), (&"error".into(), &2.into(), Some(2)));
+    let [message, because] = ["message", "because"].map(|key| error[key].to_string());
+    assert!(message.contains("rebound.json") && (message + &because).contains("time.step"), "{error}");
+    assert_eq!(rebound(directory.path(), &["--progress", "json", "--quiet"])?.0, Some(2));
     Ok(())
 }
 
 #[test]
 fn a_run_warns_once_of_halved_steps_and_many_iterations() -> Result<(), Failure> {
     let directory = tempfile::tempdir()?;
-    let scene = scene("rebound_fast.json");
     let arguments = ["--set", "time.step=0.2", "--set", "solver.newton.max_iterations=3", "--until", "6", "--quiet"];
-    let output = program().arg("run").arg(scene).arg("--out").arg(directory.path()).args(arguments).output()?;
-    let text = String::from_utf8(output.stderr)?;
-    assert!(output.status.success(), "{text}");
+    let (code, _, text) = run(&scene("rebound_fast.json"), directory.path(), &arguments)?;
+    assert_eq!(code, Some(0), "{text}");
     assert_eq!(text.matches("the step had to be halved").count(), 1, "{text}");
     assert!(text.contains("of 3 allowed iterations"), "{text}");
     let warnings = report(directory.path())?["warnings"].clone();
@@ -190,19 +169,15 @@ fn a_run_says_what_solves_its_systems_and_warns_of_those_left_unsolved() -> Resu
     const METHOD: &str = "solver.krylov.method=\"automatic\"";
     let directory = tempfile::tempdir()?;
     let arguments = ["--steps", "2", "--set", "solver.krylov.max_iterations=2", "--set", METHOD];
-    let mut run = program();
-    let output =
-        run.arg("run").arg(scene("compaction.json")).arg("--out").arg(directory.path()).args(arguments).output()?;
-    let (text, told) = (String::from_utf8(output.stdout)?, String::from_utf8(output.stderr)?);
-    assert!(output.status.success(), "{told}");
+    let (code, text, told) = run(&scene("compaction.json"), directory.path(), &arguments)?;
+    assert_eq!(code, Some(0), "{told}");
     assert!(text.contains("of conjugate gradients a step"), "{text}");
     assert_eq!(told.matches("left unsolved after the 2 iterations allowed").count(), 1, "{told}");
     let report = report(directory.path())?;
     assert_eq!(report["counts"]["krylov_limited"], report["counts"]["newton_iterations"]);
     let krylov = serde_json::json!({ "method": "conjugate gradients", "why": "the tangent is symmetric" });
     assert_eq!((&report["krylov"], &report["warnings"][0]["kind"]), (&krylov, &"krylov_limited".into()));
-    let output = program().arg("check").arg(scene("compaction.json")).output()?;
-    let text = String::from_utf8(output.stdout)?;
+    let (_, text, _) = check(&scene("compaction.json"), &[])?;
     assert!(text.contains("solver        GMRES(30): it was asked for"), "{text}");
     Ok(())
 }
@@ -212,10 +187,8 @@ fn ran(text: &Value) -> Result<(String, String, Value), Failure> {
     let directory = tempfile::tempdir()?;
     let (path, out) = (directory.path().join("scene.json"), directory.path().join("out"));
     std::fs::write(&path, text.to_string())?;
-    let output = program().arg("run").arg(&path).arg("--out").arg(&out).output()?;
-    let [said, warned] = [output.stdout, output.stderr].map(String::from_utf8);
-    let (said, warned) = (said?, warned?);
-    assert!(output.status.success(), "{warned}");
+    let (code, said, warned) = run(&path, &out, &[])?;
+    assert_eq!(code, Some(0), "{warned}");
     Ok((said, warned, report(&out)?))
 }
 
@@ -230,10 +203,8 @@ fn a_ring_that_bounces_says_how_much_energy_it_lost_and_where() -> Result<(), Fa
     }))?;
     assert!(warned.contains("energy was lost") && warned.contains("a body meets a wall (impact)"), "{warned}");
     let [first, lost] = report["warnings"].as_array().map_or(&[][..], Vec::as_slice) else { panic!("{report}") };
-    assert!(
-        first["kind"] == "energy_lost" && lost["kind"] == "energy_lost" && lost["time"] == report["time"],
-        "{report}"
-    );
+    assert!(first["kind"] == "energy_lost" && lost["kind"] == "energy_lost", "{report}");
+    assert_eq!(lost["time"], report["time"]);
     // The message gives the final loss, relative to the largest energy without the work of the weight.
     let balance = report["energies"]["balance"].as_f64().ok_or("no balance")?;
     let message = lost["message"].as_str().unwrap_or_default();
@@ -244,8 +215,8 @@ fn a_ring_that_bounces_says_how_much_energy_it_lost_and_where() -> Result<(), Fa
 /// Two blocks with the distance `gap`. They start with velocities that separate them, or that make them collide.
 fn blocks(gap: f64, apart: f64) -> Value {
     let block = |name: &str, y: f64, v: f64| {
-        json!({"name": name, "density": 1, "velocity": [0, v], "shape": {"box": {"min": [2, y], "max": [6, y + 2.0]}},
-               "material": {"neo_hookean": {"young": 100, "poisson": 0.3}}})
+        let shape = json!({"box": {"min": [2, y], "max": [6, y + 2.0]}});
+        merged(solid(name, 100, shape), json!({"velocity": [0, v]}))
     };
     json!({"grid": {"size": [8, 10], "spacing": 0.5}, "time": {"step": 0.02, "end": 0.6}, "output": {},
            "bodies": [block("lower", 2.0, -apart), block("upper", 4.0 + gap, apart)]})
@@ -254,18 +225,12 @@ fn blocks(gap: f64, apart: f64) -> Value {
 #[test]
 fn bodies_that_are_glued_say_so() -> Result<(), Failure> {
     let (said, warned, report) = ran(&blocks(0.0, 0.5))?;
-    let words = [
-        "\"lower\" and \"upper\" share nodes since the start and are pulled apart",
-        "0.00 spacings",
-        "will not separate",
-    ];
-    assert!(words.iter().all(|word| warned.contains(word)), "{warned}");
+    let words = "\"lower\" and \"upper\" share nodes since the start and are pulled apart";
+    assert!([words, "0.00 spacings", "will not separate"].iter().all(|word| warned.contains(word)), "{warned}");
     assert!(said.contains("contact   \"lower\" and \"upper\" share nodes since t = 0"), "{said}");
     let contact = &report["contact"][0];
-    assert_eq!(
-        (&contact["bodies"][1], &contact["from_start"], &contact["until"]),
-        (&"upper".into(), &true.into(), &Value::Null)
-    );
+    assert_eq!((&contact["bodies"][1], &contact["from_start"]), (&"upper".into(), &true.into()));
+    assert!(contact["until"].is_null(), "{contact}");
     assert!(contact["pulled_apart"].as_f64().is_some_and(|time| time < 0.1), "{report}");
     // Blocks pressed together are in contact, which causes no warning.
     let mut pressed = blocks(0.0, -0.5);
@@ -284,10 +249,9 @@ fn check_says_which_bodies_are_glued_from_the_start() -> Result<(), Failure> {
     let path = directory.path().join("scene.json");
     for (gap, glued) in [(0.0, true), (3.0, false)] {
         std::fs::write(&path, blocks(gap, 0.0).to_string())?;
-        let output = program().arg("check").arg(&path).output()?;
-        let said = String::from_utf8(output.stdout)?;
+        let (code, said, _) = check(&path, &[])?;
         let words = "\"lower\" and \"upper\" share nodes at the start, at a gap of 0.00 spacings";
-        assert!(output.status.success() && said.contains(words) == glued, "{said}");
+        assert!(code == Some(0) && said.contains(words) == glued, "{said}");
     }
     Ok(())
 }

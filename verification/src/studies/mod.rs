@@ -98,6 +98,7 @@ studies!(
     balance,
     symmetry,
     digits,
+    black_box,
     memory,
     extremes,
     manufactured,

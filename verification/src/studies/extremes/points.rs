@@ -154,7 +154,8 @@ fn naive<T: Real, const D: usize>(law: &Material, h: &Tensor<T, D>) -> (T, Tenso
         | Material::FibreReinforced(_)
         | Material::Viscoelastic(_)
         | Material::VonMises(_)
-        | Material::DruckerPrager(_) => {
+        | Material::DruckerPrager(_)
+        | Material::Foreign(_) => {
             return (lit(f64::NAN), Tensor::from_element(lit(f64::NAN)));
         }
         Material::StVenantKirchhoff(StVenantKirchhoff { lame }) => {
