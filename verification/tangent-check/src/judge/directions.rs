@@ -1,10 +1,9 @@
 //! The check of a tangent with many unknowns, through products with random directions.
 
-use super::check::{Loading, asks_for_jump, jump_of_loading, measure};
+use super::check::{Loading, explained, measure};
 use super::{Entry, Finding, Matrix, Measured, Verdict, failed, greatest, judge};
 use crate::difference::{Ladder, derivative};
 use crate::law::CallFailed;
-use std::cell::Cell;
 
 /// The directions of a check.
 pub struct Directions<'a> {
@@ -24,11 +23,11 @@ impl Default for Directions<'_> {
     }
 }
 
-/// The claimed product J w.
-type Product<'a> = &'a mut dyn FnMut(&[f64]) -> Result<Vec<f64>, CallFailed>;
+/// The claimed product J w of a direction w.
+pub type Product<'a> = dyn FnMut(&[f64]) -> Result<Vec<f64>, CallFailed> + 'a;
 
-/// The response at u + h w.
-type Residual<'a> = &'a mut dyn FnMut(&[f64], f64) -> Result<Vec<f64>, CallFailed>;
+/// The response at u + h w, for a direction w and h.
+pub type Residual<'a> = dyn FnMut(&[f64], f64) -> Result<Vec<f64>, CallFailed> + 'a;
 
 /// Checks a tangent with many unknowns along random directions w: the claimed `product(w)` = J w, beside the derivative of `f(w, h)`, which
 /// is the response at u + h w.
@@ -54,66 +53,50 @@ pub fn check_directions(
     name: &str,
     unknowns: usize,
     value: &[f64],
-    product: &mut dyn FnMut(&[f64]) -> Result<Vec<f64>, CallFailed>,
-    f: &mut dyn FnMut(&[f64], f64) -> Result<Vec<f64>, CallFailed>,
+    product: &mut Product<'_>,
+    f: &mut Residual<'_>,
     directions: Directions<'_>,
 ) -> Finding {
     let Directions { count, seed, ladder, loading } = directions;
-    let calls = Cell::new(0);
+    let mut calls = 0;
     let mut f = |w: &[f64], h: f64| {
-        calls.set(calls.get() + 1);
+        calls += 1;
         f(w, h)
     };
     let mut random = Random(seed);
     let all: Vec<Vec<f64>> = (0..count).map(|_| (0..unknowns).map(|_| random.signed()).collect()).collect();
     let mut claimed = Matrix::zeros(value.len(), count);
-    let measured = claim(&mut claimed, &all, product).and_then(|()| {
-        finite(value, value.len())?;
-        measure(&claimed, value, ladder, &mut |k, h| f(&all[k], h))
-    });
+    let measured =
+        claim(&mut claimed, &all, product).and_then(|()| measure(&claimed, value, ladder, &mut |k, h| f(&all[k], h)));
     let mut measured = match measured {
-        Ok(measured) => Measured { calls: calls.get(), ..measured },
-        Err(CallFailed(sentence)) => return failed(name, &claimed, value.len(), count, sentence, calls.get()),
+        Ok(measured) => measured,
+        Err(CallFailed(sentence)) => return failed(name, &claimed, value.len(), count, sentence, calls),
     };
-    let mut finding = judge(name, &claimed, &measured);
-    if let (true, Some(loading)) = (asks_for_jump(&finding), loading) {
-        let mut respond = |part: f64| {
-            calls.set(calls.get() + 1);
-            (loading.respond)(part)
-        };
-        measured.jump =
-            jump_of_loading(&claimed, &measured, &mut Loading { size: loading.size, respond: &mut respond });
-        measured.calls = calls.get();
-        finding = judge(name, &claimed, &measured);
-    }
+    let measured_calls = measured.calls;
+    let mut finding = explained(judge(name, &claimed, &measured), &mut measured, loading);
+    let jump_calls = finding.calls - measured_calls;
     if let (Verdict::Wrong, Some(worst)) = (finding.verdict, finding.worst) {
         let found = locate(&all[worst.column], worst.row, &measured, ladder, product, &mut f);
         finding.worst = found.or(finding.worst);
-        finding.calls = calls.get();
+        finding.calls = calls + jump_calls;
     }
     finding
 }
 
 /// Fills in the claimed products.
-fn claim(claimed: &mut Matrix, directions: &[Vec<f64>], product: Product<'_>) -> Result<(), CallFailed> {
+fn claim(claimed: &mut Matrix, directions: &[Vec<f64>], product: &mut Product<'_>) -> Result<(), CallFailed> {
+    let rows = claimed.rows;
     for (k, w) in directions.iter().enumerate() {
         let values = product(w)?;
-        finite(&values, claimed.rows)?;
+        if values.len() != rows {
+            let size = values.len();
+            return Err(CallFailed(format!("The product J w has {size} entries, but the response has {rows}.")));
+        }
         for (i, value) in values.into_iter().enumerate() {
             claimed[(i, k)] = value;
         }
     }
     Ok(())
-}
-
-fn finite(values: &[f64], size: usize) -> Result<(), CallFailed> {
-    if values.len() != size {
-        return Err(CallFailed(format!("The product J w has {} entries, but the response has {size}.", values.len())));
-    }
-    match values.iter().position(|value| !value.is_finite()) {
-        Some(i) => Err(CallFailed(format!("Entry {i} of the response or of the product J w is {}.", values[i]))),
-        None => Ok(()),
-    }
 }
 
 /// Finds the unknown whose column deviates in a row, by halving the direction.
@@ -122,8 +105,8 @@ fn locate(
     row: usize,
     measured: &Measured,
     ladder: Ladder,
-    product: Product<'_>,
-    f: Residual<'_>,
+    product: &mut Product<'_>,
+    f: &mut Residual<'_>,
 ) -> Option<Entry> {
     let mut entry = |w: &[f64], column: usize| {
         let claimed = *product(w).ok()?.get(row)?;

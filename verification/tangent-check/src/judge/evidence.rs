@@ -5,6 +5,9 @@ use super::{Derivative, ERRORS, Entry, Estimate, Matrix, Measured, NOISY, greate
 /// The round-off of a claimed tangent over ‖C‖, in units of ε.
 const ROUND_OFF: f64 = 4.0;
 
+/// A side whose error is this many times that of the best estimate is blurred.
+const BLURRED: f64 = 10.0;
+
 /// The verdict over one column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ColumnVerdict {
@@ -18,9 +21,11 @@ pub(super) enum ColumnVerdict {
 pub(super) struct Column {
     /// The derivatives that the column may match: the best, or those to both sides of a kink that are sharp.
     accepted: Vec<Estimate>,
-    /// The derivatives to both sides. While one of them could be the claimed column, a kink cannot be excluded.
+    /// The derivatives to both sides. While a blurred side could be the claimed column, a kink cannot be excluded.
     sides: Vec<Estimate>,
     kink: bool,
+    /// Whether the difference at the smallest perturbation contradicts the best.
+    contradicted: bool,
 }
 
 /// The measured tangent in the form in which columns are judged.
@@ -41,7 +46,7 @@ impl Evidence {
         let mut columns: Vec<Column> = measured.columns.iter().map(Column::of).collect();
         let values = columns.iter().flat_map(|column| &column.accepted).flat_map(|estimate| &estimate.value);
         let scale = values.filter(|value| value.is_finite()).fold(0.0_f64, |greatest, value| greatest.max(value.abs()));
-        for Column { accepted, sides, kink } in &mut columns {
+        for Column { accepted, sides, kink, .. } in &mut columns {
             for error in accepted.iter_mut().chain(&mut *sides).flat_map(|estimate| &mut estimate.error) {
                 *error += ROUND_OFF * f64::EPSILON * scale;
             }
@@ -58,8 +63,9 @@ impl Evidence {
         let scale = exact.greatest();
         let error = vec![bound * scale; exact.rows];
         let column = |k| Estimate { value: super::column(exact, k), error: error.clone() };
-        let columns =
-            (0..exact.columns).map(|k| Column { accepted: vec![column(k)], sides: vec![], kink: false }).collect();
+        let columns = (0..exact.columns)
+            .map(|k| Column { accepted: vec![column(k)], sides: vec![], kink: false, contradicted: false })
+            .collect();
         Self { columns, scale, errors: 1.0, explained: 0.0 }
     }
 
@@ -70,18 +76,21 @@ impl Evidence {
 
     /// The verdict over column `k`, if the law claims `claimed`.
     pub fn verdict(&self, k: usize, claimed: &[f64]) -> ColumnVerdict {
-        let Column { accepted, sides, kink } = &self.columns[k];
-        let any =
-            |estimates: &[Estimate], explained| estimates.iter().any(|side| self.matches(side, claimed, explained));
-        if any(accepted, 0.0) {
-            ColumnVerdict::Consistent
-        } else if any(accepted, self.explained) {
-            ColumnVerdict::Inexact
-        } else if *kink || any(sides, 0.0) {
-            ColumnVerdict::Kink
-        } else {
-            ColumnVerdict::Wrong
+        let Column { accepted, sides, kink, contradicted } = &self.columns[k];
+        let any = |explained| accepted.iter().any(|side| self.matches(side, claimed, explained));
+        if any(0.0) {
+            return ColumnVerdict::Consistent;
         }
+        if any(self.explained) {
+            return ColumnVerdict::Inexact;
+        }
+        let possible = sides.iter().any(|side| self.blurred(side, accepted) && self.matches(side, claimed, 0.0));
+        if *kink || *contradicted || possible { ColumnVerdict::Kink } else { ColumnVerdict::Wrong }
+    }
+
+    /// Whether a side is far less sharp than what a column must match.
+    fn blurred(&self, side: &Estimate, accepted: &[Estimate]) -> bool {
+        accepted.iter().all(|best| side.greatest_error() > BLURRED * best.greatest_error())
     }
 
     /// Whether no entry deviates by more than its error allows, or than `explained`.
@@ -133,6 +142,7 @@ impl Column {
         let sides: Vec<Estimate> =
             [&derivative.forward, &derivative.backward].into_iter().filter(measured).cloned().collect();
         let kink = derivative.has_kink();
-        Self { accepted: if kink { sides.clone() } else { vec![derivative.best()] }, sides, kink }
+        let accepted = if kink { sides.clone() } else { vec![derivative.best()] };
+        Self { accepted, sides, kink, contradicted: derivative.contradicted }
     }
 }

@@ -22,7 +22,7 @@ const NODES: usize = 7;
 const MISFIT: f64 = 30.0;
 
 /// The first step of the walk, over its length.
-const FIRST: f64 = 1e-3;
+const FIRST: f64 = 1e-5;
 
 /// A step of the walk below this part of its distance holds nothing but a jump or a kink.
 const FINEST: f64 = 1e-13;
@@ -86,7 +86,11 @@ impl Line<'_> {
                 let size = value.iter().zip(before).fold(0.0_f64, |size, (a, b)| size.max((a - b).abs()));
                 let jump = Jump { size, distance: h };
                 let continuous = MISFIT * self.noise + 10.0 * steepest(&nodes) * step;
-                return (size > continuous && jump.slope() > self.deviation).then_some(jump);
+                if size > continuous && jump.slope() > self.deviation {
+                    return Some(jump);
+                }
+                nodes = vec![(h, value)];
+                step = FIRST * self.length;
             }
         }
         None

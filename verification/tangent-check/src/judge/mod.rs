@@ -6,8 +6,8 @@ mod directions;
 mod evidence;
 mod loose;
 
-pub use check::{Loading, check_columns, check_columns_on};
-pub use directions::{Directions, check_directions};
+pub use check::{Loading, check_columns, check_columns_on, measure};
+pub use directions::{Directions, Product, Residual, check_directions};
 pub use loose::Jump;
 
 use crate::difference::{Derivative, ERRORS, Estimate};
@@ -37,7 +37,9 @@ pub struct Measured {
 ///
 /// With the estimated error e of an entry, plus 4 ε ‖C‖ for the round-off of the claimed tangent:
 ///
-/// - At a kink, a column must match D₊ or D₋ within 10 e. Otherwise it is not checked.
+/// - At a kink, a column must match D₊ or D₋ within 10 e, with e below 1e-6 ‖C‖. Otherwise it is not checked. The same holds for a column
+///   that deviates where a kink cannot be excluded: a side is far less sharp than the best estimate and matches the column, or the last look
+///   near √ε contradicts the estimates.
 /// - Elsewhere, a deviation above 10 e is wrong. It is inexact if it is below 1e-5 ‖C‖ and a [`Jump`] explains it.
 /// - An error e above 1e-6 ‖C‖ is too noisy.
 /// - Then the checker spoils the entries above 1 % of ‖C‖ one by one. If it does not see 1e-3 in each, the tangent is not checked.
@@ -48,7 +50,11 @@ pub fn judge(name: &str, claimed: &Matrix, measured: &Measured) -> Finding {
     let mut finding = start(name, claimed, size, measured.columns.len());
     finding.calls = measured.calls;
     finding.noise = relative(greatest(&measured.noise), greatest(&measured.value));
-    let whole = measured.columns.iter().all(|column| column.central.value.len() == size);
+    let fits = |estimate: &Estimate| estimate.value.len() == size && estimate.error.len() == size;
+    let whole = measured
+        .columns
+        .iter()
+        .all(|column| [&column.central, &column.forward, &column.backward].into_iter().all(fits));
     if let Some(fault) = fault(claimed, size, measured.columns.len(), whole) {
         return not_checked(finding, Reason::CallFailed(fault));
     }

@@ -37,7 +37,9 @@ pub fn case(law: &'static str, number: usize) -> Case {
     let index = LAWS.iter().position(|name| *name == law).unwrap_or(LAWS.len());
     let mut random = Random(1 + 1000 * index as u64 + 7_000_003 * number as u64);
     // A third of the states of plastic laws lie next to a kink.
-    let kink = (number % 3 == 0).then(|| random.logarithmic(1e-12, 1e-2) * if number % 2 == 0 { 1.0 } else { -1.0 });
+    let kink = number
+        .is_multiple_of(3)
+        .then(|| random.logarithmic(1e-12, 1e-2) * if number.is_multiple_of(2) { 1.0 } else { -1.0 });
     match law {
         "neo-Hookean, exp(h B) F" => kirchhoff(law, deformation(&mut random)),
         "neo-Hookean, P(F)" => neo_hookean(law, deformation(&mut random)),
@@ -217,4 +219,19 @@ fn kirchhoff(law: &'static str, f: T2) -> Case {
         PAIRS.map(|(i, j)| tau[i][j]).to_vec()
     };
     Case { law, kink: None, value: PAIRS.map(|(i, j)| value[i][j]).to_vec(), claimed, respond: Box::new(respond) }
+}
+
+/// The same law computed in single precision. Its claimed tangent is computed in double precision.
+pub fn single(number: usize) -> Case {
+    let f = deformation(&mut Random(5 + 31 * number as u64));
+    let case = kirchhoff("single precision", f);
+    let tau = move |f: &T2| {
+        let f: Vec<f32> = f.concat().into_iter().map(|entry| entry as f32).collect();
+        let b = |i: usize, j: usize| (0..3).map(|k| f[3 * i + k] * f[3 * j + k]).sum::<f32>();
+        let minor = |i: usize, j: usize| f[3 + i] * f[6 + j] - f[3 + j] * f[6 + i];
+        let log_j = (f[0] * minor(1, 2) - f[1] * minor(0, 2) + f[2] * minor(0, 1)).ln();
+        let volume = (BULK - 2.0 / 3.0 * SHEAR) as f32 * log_j - SHEAR as f32;
+        PAIRS.map(|(i, j)| f64::from(SHEAR as f32 * b(i, j) + if i == j { volume } else { 0.0 })).to_vec()
+    };
+    Case { value: tau(&f), respond: Box::new(move |column, h| tau(&stretched(&f, column, h))), ..case }
 }

@@ -220,7 +220,6 @@ impl Law for DruckerPrager {
                     + BULK * (1.0 - BULK * eta * eta_bar * a) * I[i][j] * I[k][l]
             });
             let stress = combine(pressure - BULK * eta_bar * gamma, &I, 2.0 * SHEAR * (1.0 - share), &direction);
-            // dD/dε_d contributes with η for the columns of pressure, with η̄ for the rows.
             return (stress, tangent);
         }
         // ξ/η c(α + ξ/η̄ Δε_v) − (p − K Δε_v) = 0
