@@ -345,7 +345,8 @@ def test_every_form_of_a_tangent(size):
         report = bfree.check_tangent(cubes, form, u)
         assert report.verdict == "consistent" and report.subject == "cubes", name
     J[3, 4] += 0.01
-    for form in (J, csr_array(J), aslinearoperator(J), lambda u, w: J @ w):
+    without_transpose = LinearOperator((size, size), matvec=lambda w: J @ w, dtype=float)
+    for form in (J, csr_array(J), aslinearoperator(J), without_transpose, lambda u, w: J @ w):
         report = bfree.check_tangent(cubes, form, u)
         (finding,) = report.findings
         assert report.verdict == "wrong" and (finding.worst.row, finding.worst.column) == (3, 4)
@@ -481,7 +482,8 @@ def fortran(tmp_path_factory):
             text = text.replace(old, new)
         (folder / source).write_text(text)
         library = folder / "libmine.so"
-        subprocess.run(["gfortran", "-shared", "-fPIC", "-O2", "-o", library, folder / source], check=True, cwd=folder)
+        command = ["gfortran", "-shared", "-fPIC", "-O2", "-I", ROOT / "examples" / "laws", "-o", library, folder / source]
+        subprocess.run(command, check=True)
         return library
 
     return compiled
@@ -514,6 +516,23 @@ def test_a_crash_in_a_library_is_a_finding(fortran):
     )
     sentences = [finding.sentence for finding in report.findings if finding.reason == "call failed"]
     assert len(sentences) == 1 and "the library ended its program, with exit code 3" in sentences[0]
+
+
+def test_a_scene_loads_only_libraries_that_are_allowed(fortran):
+    library = fortran("neo_hookean.f")
+    law = {"umat": {"library": str(library), "properties": [100.0, 60.0]}}
+    scene = {
+        "grid": {"size": [3, 2], "spacing": 0.25},
+        "time": {"step": 1, "end": 1, "scheme": "none"},
+        "bodies": [{"name": "block", "shape": {"box": {"min": [0, 0], "max": [1, 1]}}, "density": 1, "material": law}],
+        "boundary": {"bottom": "fixed"},
+        "gravity": {"acceleration": [0, -10]},
+    }
+    with pytest.raises(bfree.SceneError, match="allow_libraries"):
+        bfree.Scene(scene)
+    step = bfree.Scene(scene, allow_libraries=[library]).build().advance()
+    assert step.reactions["bottom"] == pytest.approx([0, 10], abs=1e-6)
+    assert bfree.newton_order(step.residuals).is_quadratic
 
 
 PLUGIN_TESTS = """

@@ -29,11 +29,13 @@ class Scene:
         *,
         set: Mapping[str, Any] | None = None,
         folder: str | os.PathLike[str] | None = None,
+        allow_libraries: Sequence[str | os.PathLike[str]] = (),
     ) -> None:
         """Reads a file, or takes a dict of the same keys.
 
         `set` replaces values by their paths, as `{"time.step": 0.01, "bodies.0.density": 3}`. Files that the scene names are looked for in
-        `folder`: by default the one of the scene's file, or the current one.
+        `folder`: by default the one of the scene's file, or the current one. A scene loads shared libraries with material laws only if
+        `allow_libraries` has their paths; the permission lasts as long as the interpreter.
 
         Raises SceneError.
         """

@@ -56,7 +56,7 @@ class TangentCheck:
 
 
 def _greatest(values: list[float]) -> str:
-    return f"{max(values):.1e}" if values else "-"
+    return f"{max(values):.1e}".replace("e-0", "e-") if values else "-"
 
 
 @pytest.fixture

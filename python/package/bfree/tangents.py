@@ -283,7 +283,7 @@ class _Checked:
                 f"{self.name}: the tangent has the shape {jacobian.shape}; a residual with {wanted[0]} entries and u with "
                 f"{wanted[1]} need {wanted}"
             )
-        return jacobian, lambda w: self._fits(jacobian @ w)
+        return jacobian, lambda w: self._fits(jacobian @ w.copy())
 
     def _fits(self, product):
         product = _numbers("the product of the tangent", product).ravel()

@@ -17,8 +17,11 @@ const MEASURES: [(&str, Measure, &str); 9] = [
     ("kirchhoff_gradient", Measure::KirchhoffByGradient, "voigt"),
 ];
 
-/// The orders of the components of a symmetric tensor, of stresses (false) or strains (true).
-const ORDERS: [(&str, fn(bool) -> Components); 4] = [
+/// The components of a symmetric tensor: of a stress (false) or a strain (true).
+type Order = fn(bool) -> Components;
+
+/// The orders by their names.
+const ORDERS: [(&str, Order); 4] = [
     ("voigt", |strain| Components::voigt(if strain { 2.0 } else { 1.0 })),
     ("abaqus", |strain| Components::abaqus(if strain { 2.0 } else { 1.0 })),
     ("explicit", |_| Components::explicit(1.0)),

@@ -119,11 +119,8 @@ impl<'py> PythonLaw<'py> {
     fn step(&self, step: &Step) -> LawStep {
         let components = &self.convention.stress;
         let symmetric = self.convention.measure != tangent_check::convention::Measure::PiolaByGradient;
-        let stress = if symmetric {
-            components.symmetric_tensor(&step.stress)
-        } else {
-            components.full_tensor(&step.stress)
-        };
+        let stress =
+            if symmetric { components.symmetric_tensor(&step.stress) } else { components.full_tensor(&step.stress) };
         LawStep { step: step.clone(), stress, dimension: self.dimension }
     }
 }

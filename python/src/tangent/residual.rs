@@ -75,9 +75,9 @@ impl Residual<'_, '_> {
         let directions = Directions { count: DIRECTIONS, seed, ladder: Ladder::default(), loading: None };
         let mut finding = check_directions(name, self.u.len(), value, &mut product, &mut f, directions);
         // An entry that is not located belongs to a direction, not to an unknown.
-        finding.worst = finding.worst.filter(|worst| {
-            worst.column >= DIRECTIONS || finding.claimed[(worst.row, worst.column)] != worst.claimed
-        });
+        finding.worst = finding
+            .worst
+            .filter(|worst| worst.column >= DIRECTIONS || finding.claimed[(worst.row, worst.column)] != worst.claimed);
         self.unscale(&mut finding);
         finding
     }
@@ -103,8 +103,10 @@ fn directions(scale: &[f64], seed: u64) -> Vec<Vec<f64>> {
     (0..DIRECTIONS).map(|_| scale.iter().map(|s| s * random.signed()).collect()).collect()
 }
 
-/// Checks a tangent at u. `residual` and `product` take and give flat arrays. Gives the finding, the directions of its columns, and the
-/// first exception.
+/// A finding, the directions of its columns, and the first exception.
+type Answer = (Finding, Vec<Vec<f64>>, Option<Py<PyAny>>);
+
+/// Checks a tangent at u. `residual` and `product` take and give flat arrays.
 #[pyfunction]
 pub fn check_residual(
     name: &str,
@@ -114,7 +116,7 @@ pub fn check_residual(
     residual: &Bound<'_, PyAny>,
     product: &Bound<'_, PyAny>,
     seed: u64,
-) -> PyResult<(Finding, Vec<Vec<f64>>, Option<Py<PyAny>>)> {
+) -> PyResult<Answer> {
     let py = residual.py();
     let around = Residual { u: &u, scale: &scale, residual, product };
     let mut raised = Raised::default();
