@@ -24,11 +24,14 @@ const TIME_TOLERANCE: f64 = 1e-6;
 /// assert_eq!((read.steps(), Clock::new(0.1, 2).at(read)), (2, Some(clock)));
 /// # Ok::<(), serde_json::Error>(())
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Reached {
+    /// Time since the start, in ticks of Δt / 2^[`MAX_HALVINGS`].
     ticks: u64,
+    /// The current step is Δt / 2^level.
     level: u32,
+    /// Steps taken.
     steps: u64,
 }
 
@@ -64,25 +67,18 @@ pub struct Clock {
     max_halvings: u32,
     /// The end time of a clock from [`Clock::to`], which has a single nominal step.
     end: Option<f64>,
-    /// Time since the start, in ticks of Δt / 2^[`MAX_HALVINGS`].
-    ticks: u64,
-    /// The current step is Δt / 2^level.
-    level: u32,
-    /// Steps taken.
-    steps: u64,
+    reached: Reached,
 }
 
 impl Clock {
     /// At time zero, with nominal step `dt`, which may be halved `max_halvings` times (at most [`MAX_HALVINGS`]).
     pub fn new(dt: f64, max_halvings: u32) -> Self {
-        let max_halvings = max_halvings.min(MAX_HALVINGS);
-        Self { nominal: dt, max_halvings, end: None, ticks: 0, level: 0, steps: 0 }
+        Self { nominal: dt, max_halvings: max_halvings.min(MAX_HALVINGS), end: None, reached: Reached::default() }
     }
 
     /// The steps and the time reached.
     pub fn reached(&self) -> Reached {
-        let Self { nominal: _, max_halvings: _, end: _, ticks, level, steps } = *self;
-        Reached { ticks, level, steps }
+        self.reached
     }
 
     /// This clock, set to what another clock with the same nominal step has reached. `None` if this clock cannot reach it.
@@ -101,16 +97,16 @@ impl Clock {
     /// assert_eq!(Clock::new(0.1, 0).at(reached), None);
     /// ```
     pub fn at(self, reached: Reached) -> Option<Self> {
-        let Reached { ticks, level, steps } = reached;
+        let Reached { ticks, level, .. } = reached;
         // The limit is far below an overflow of the ticks, and far above any number of steps.
         let possible = level <= self.max_halvings && ticks < 1 << 62 && ticks.is_multiple_of(TICKS >> level);
-        possible.then_some(Self { ticks, level, steps, ..self })
+        possible.then_some(Self { reached, ..self })
     }
 
     /// t_n
     pub fn time(&self) -> f64 {
         // The time is exact while the number of steps is, because whole steps and the fraction are each multiplied once.
-        let (whole, part) = ((self.ticks / TICKS) as f64, (self.ticks % TICKS) as f64 / TICKS as f64);
+        let (whole, part) = ((self.reached.ticks / TICKS) as f64, (self.reached.ticks % TICKS) as f64 / TICKS as f64);
         match self.end {
             Some(end) => end + (whole - 1.0) * self.nominal + part * self.nominal,
             None => whole * self.nominal + part * self.nominal,
@@ -119,7 +115,7 @@ impl Clock {
 
     /// Δt of the coming step.
     pub fn step(&self) -> f64 {
-        self.nominal / (1_u64 << self.level) as f64
+        self.nominal / (1_u64 << self.reached.level) as f64
     }
 
     /// The nominal Δt.
@@ -184,22 +180,23 @@ impl Clock {
         let between = rest > TIME_TOLERANCE * self.nominal && rest < self.nominal;
         let level = (0..self.max_halvings).find(|&level| rest <= self.step() * (1_u64 << level) as f64);
         let level = level.unwrap_or(self.max_halvings);
-        between.then_some(Self { nominal: rest, end: Some(end), ticks: 0, level, ..*self })
+        let reached = Reached { ticks: 0, level, ..self.reached };
+        between.then_some(Self { nominal: rest, end: Some(end), reached, ..*self })
     }
 
     /// Steps taken so far.
     pub fn steps(&self) -> u64 {
-        self.steps
+        self.reached.steps
     }
 
     /// Nominal steps completed.
     pub fn nominal_steps(&self) -> u64 {
-        self.ticks / TICKS
+        self.reached.ticks / TICKS
     }
 
     /// Whether t_n is a multiple of the nominal step.
     pub fn on_nominal(&self) -> bool {
-        self.ticks.is_multiple_of(TICKS)
+        self.reached.ticks.is_multiple_of(TICKS)
     }
 
     /// Moves to t_{n+1}. A halved step doubles as soon as t_{n+1} is a multiple of the doubled step.
@@ -223,10 +220,10 @@ impl Clock {
     /// assert_eq!((clock.time(), clock.step()), (2.0, 1.0));
     /// ```
     pub fn advance_and_grow_if(&mut self, may: bool) {
-        self.ticks += TICKS >> self.level;
-        self.steps += 1;
-        if may && self.level > 0 && self.ticks.is_multiple_of(TICKS >> (self.level - 1)) {
-            self.level -= 1;
+        self.reached.ticks += TICKS >> self.reached.level;
+        self.reached.steps += 1;
+        if may && self.reached.level > 0 && self.reached.ticks.is_multiple_of(TICKS >> (self.reached.level - 1)) {
+            self.reached.level -= 1;
         }
     }
 
@@ -241,7 +238,7 @@ impl Clock {
     /// assert_eq!(clock.step(), 0.5);
     /// ```
     pub fn can_halve(&self) -> bool {
-        self.level < self.max_halvings
+        self.reached.level < self.max_halvings
     }
 
     /// Halves the step; `false` if the limit is reached.
@@ -258,9 +255,7 @@ impl Clock {
     /// ```
     pub fn halve(&mut self) -> bool {
         let possible = self.can_halve();
-        if possible {
-            self.level += 1;
-        }
+        self.reached.level += u32::from(possible);
         possible
     }
 }

@@ -168,6 +168,13 @@ impl<const D: usize> Grid<D> {
         }
         Some(cell)
     }
+
+    /// The cells at most `reach` cells away from a cell along each axis, with the cell itself.
+    pub(crate) fn around(&self, cell: [u32; D], reach: u32) -> impl Iterator<Item = [u32; D]> {
+        let low = cell.map(|i| i.saturating_sub(reach));
+        let counts: [u64; D] = std::array::from_fn(|k| u64::from((cell[k] + reach + 1).min(self.cells[k]) - low[k]));
+        indices(counts).map(move |step| std::array::from_fn(|k| low[k] + step[k] as u32))
+    }
 }
 
 /// All indices below `count`, the first axis fastest.

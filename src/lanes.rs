@@ -3,7 +3,6 @@
 //! The operations and their order are the same on every processor. Results differ between processors in one way only: a·b + c is
 //! rounded once with FMA, and twice without.
 
-use crate::scalar::Arithmetic;
 use pulp::{Scalar, Simd};
 use std::ops::{Add, Div, Mul, Sub};
 
@@ -11,31 +10,75 @@ use std::ops::{Add, Div, Mul, Sub};
 use pulp::x86::{V3, V4};
 
 /// Number of lanes of a vector.
-pub const LANES: usize = 8;
+pub(crate) const LANES: usize = 8;
 
-/// Arithmetic on lanes. A value of this type proves that the processor has the instructions.
-pub trait Lanes: Arithmetic {
+/// A number, or the lanes of a vector, so that a formula written once serves both. Numbers and lanes agree bitwise, except that the two
+/// methods with products round once on a processor with FMA.
+pub(crate) trait Lane:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
+{
+    /// The constant `x` in the type of `self`.
+    fn constant(self, x: f64) -> Self;
+
+    /// self + a b
+    fn add_product(self, a: Self, b: Self) -> Self;
+
+    /// self − a b
+    fn sub_product(self, a: Self, b: Self) -> Self;
+
+    /// `then` where `self` < `other`, and `otherwise` elsewhere.
+    fn where_less(self, other: Self, then: Self, otherwise: Self) -> Self;
+
+    /// |x|
+    fn abs(self) -> Self;
+}
+
+impl Lane for f64 {
+    #[inline(always)]
+    fn constant(self, x: f64) -> Self {
+        x
+    }
+
+    #[inline(always)]
+    fn add_product(self, a: Self, b: Self) -> Self {
+        self + a * b
+    }
+
+    #[inline(always)]
+    fn sub_product(self, a: Self, b: Self) -> Self {
+        self - a * b
+    }
+
+    #[inline(always)]
+    fn where_less(self, other: Self, then: Self, otherwise: Self) -> Self {
+        if self < other { then } else { otherwise }
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        self.abs()
+    }
+}
+
+/// The vectors of a processor. A value of this type proves that the processor has the instructions.
+pub(crate) trait Lanes: Copy {
     /// Whether these lanes only serve the rare processor without AVX2. Kernels are then not compiled for every width.
     const RARE: bool;
+    /// A vector of eight numbers.
+    type N: Lane;
     fn splat(self, x: f64) -> Self::N;
     fn load(self, x: &[f64; LANES]) -> Self::N;
     fn store(self, v: Self::N, out: &mut [f64; LANES]);
-    fn abs(self, a: Self::N) -> Self::N;
-    fn sub(self, a: Self::N, b: Self::N) -> Self::N;
-    fn div(self, a: Self::N, b: Self::N) -> Self::N;
-    /// `then` where a < b, and `otherwise` elsewhere.
-    fn where_less(self, a: Self::N, b: Self::N, then: Self::N, otherwise: Self::N) -> Self::N;
-    /// Arithmetic on rows of nodes, a lane each. A vector holds as many rows as fill one register.
-    type Rows: Arithmetic;
+    /// A vector with a row of nodes in each lane. It holds as many rows as fill one register.
+    type Rows: Lane;
     /// Number of rows in such a vector.
     const ROWS: usize;
-    fn rows(self) -> Self::Rows;
-    fn splat_rows(self, x: f64) -> <Self::Rows as Arithmetic>::N;
+    fn splat_rows(self, x: f64) -> Self::Rows;
     /// Transposes: a vector of particles for each row becomes a vector of rows for each particle.
-    fn columns(self, rows: &[Self::N; LANES]) -> [<Self::Rows as Arithmetic>::N; LANES];
+    fn columns(self, rows: &[Self::N; LANES]) -> [Self::Rows; LANES];
     /// Adds the `k`-th of `sums` to the `k`-th number from `places[row]` on, for every row. Whole vectors are read and written, so `out`
     /// has to be one vector longer than the numbers it holds.
-    fn add_up(self, sums: &[<Self::Rows as Arithmetic>::N], places: &[usize], out: &mut [f64]);
+    fn add_up(self, sums: &[Self::Rows], places: &[usize], out: &mut [f64]);
 }
 
 /// An instruction set that transposes a square of numbers, one row a register.
@@ -59,7 +102,7 @@ pub(crate) trait WithLanes {
 
 /// Runs `work` with the widest lanes of this processor.
 #[inline]
-pub fn widest(work: impl WithLanes) {
+pub(crate) fn widest(work: impl WithLanes) {
     #[cfg(target_arch = "x86_64")]
     {
         if let Some(s) = V4::try_new() {
@@ -117,113 +160,123 @@ pub(crate) struct Registers<I, const N: usize, const R: usize>(pub I);
 /// Plain numbers, one a register.
 pub(crate) const PORTABLE: Registers<Scalar, LANES, LANES> = Registers(Scalar);
 
-/// Defines operations on lanes, register by register.
+/// `N` registers of the instruction set `I`.
+#[derive(Clone, Copy)]
+pub(crate) struct Wide<I: Simd, const N: usize>(I, [I::f64s; N]);
+
+/// Defines operations on vectors, register by register.
 macro_rules! by_register {
-    ($($method:ident($($a:ident),+) = $of_one:ident),+ $(,)?) => {
+    ($($method:ident($this:ident $(, $other:ident)*) = $of_one:ident($($a:ident),+)),+) => {
         $(#[inline(always)]
-        fn $method(self, $($a: Self::N),+) -> Self::N {
+        fn $method(self, $($other: Self),*) -> Self {
             // A loop, not a closure: a closure that is not inlined loses the wide instructions.
-            let mut out = self.zero();
+            let ($this, mut out) = (self, self);
             for i in 0..N {
-                out[i] = self.0.$of_one($($a[i]),+);
+                out.1[i] = self.0.$of_one($($a.1[i]),+);
             }
             out
         })+
     };
 }
 
-impl<I: Simd, const N: usize, const R: usize> Arithmetic for Registers<I, N, R> {
-    type N = [I::f64s; N];
+macro_rules! operator {
+    ($operator:ident, $method:ident, $of_one:ident) => {
+        impl<I: Simd, const N: usize> $operator for Wide<I, N> {
+            type Output = Self;
+            by_register! { $method(a, b) = $of_one(a, b) }
+        }
+    };
+}
+
+operator!(Add, add, add_f64s);
+operator!(Sub, sub, sub_f64s);
+operator!(Mul, mul, mul_f64s);
+operator!(Div, div, div_f64s);
+
+impl<I: Simd, const N: usize> Lane for Wide<I, N> {
     #[inline(always)]
-    fn zero(self) -> Self::N {
-        [self.0.splat_f64s(0.0); N]
+    fn constant(self, x: f64) -> Self {
+        Self(self.0, [self.0.splat_f64s(x); N])
     }
+
+    #[inline(always)]
+    fn where_less(self, other: Self, then: Self, mut otherwise: Self) -> Self {
+        for i in 0..N {
+            let less = self.0.less_than_f64s(self.1[i], other.1[i]);
+            otherwise.1[i] = self.0.select_f64s(less, then.1[i], otherwise.1[i]);
+        }
+        otherwise
+    }
+
     by_register! {
-        add(a, b) = add_f64s,
-        mul(a, b) = mul_f64s,
-        mul_add(a, b, c) = mul_add_e_f64s,
-        mul_sub(a, b, c) = negate_mul_add_e_f64s,
+        add_product(sum, a, b) = mul_add_e_f64s(a, b, sum),
+        sub_product(sum, a, b) = negate_mul_add_e_f64s(a, b, sum),
+        abs(a) = abs_f64s(a)
     }
 }
 
 impl<I: Square, const N: usize, const R: usize> Lanes for Registers<I, N, R> {
-    type Rows = Registers<I, R, R>;
     // An x86-64 without AVX2.
     const RARE: bool = I::IS_SCALAR && cfg!(target_arch = "x86_64");
-    const ROWS: usize = R * I::F64_LANES;
+    type N = Wide<I, N>;
     #[inline(always)]
     fn splat(self, x: f64) -> Self::N {
-        [self.0.splat_f64s(x); N]
+        Wide(self.0, [self.0.splat_f64s(x); N])
     }
     #[inline(always)]
     fn load(self, x: &[f64; LANES]) -> Self::N {
-        let mut out = self.zero();
-        out.copy_from_slice(I::as_simd_f64s(x).0);
+        let mut out = self.splat(0.0);
+        out.1.copy_from_slice(I::as_simd_f64s(x).0);
         out
     }
     #[inline(always)]
     fn store(self, v: Self::N, out: &mut [f64; LANES]) {
-        I::as_mut_simd_f64s(out).0.copy_from_slice(&v);
+        I::as_mut_simd_f64s(out).0.copy_from_slice(&v.1);
+    }
+    type Rows = Wide<I, R>;
+    const ROWS: usize = R * I::F64_LANES;
+    #[inline(always)]
+    fn splat_rows(self, x: f64) -> Self::Rows {
+        Wide(self.0, [self.0.splat_f64s(x); R])
     }
     #[inline(always)]
-    fn where_less(self, a: Self::N, b: Self::N, then: Self::N, mut otherwise: Self::N) -> Self::N {
-        for i in 0..N {
-            otherwise[i] = self.0.select_f64s(self.0.less_than_f64s(a[i], b[i]), then[i], otherwise[i]);
-        }
-        otherwise
-    }
-    by_register! {
-        sub(a, b) = sub_f64s,
-        div(a, b) = div_f64s,
-        abs(a) = abs_f64s,
+    fn columns(self, rows: &[Self::N; LANES]) -> [Self::Rows; LANES] {
+        transposed(self.0, rows)
     }
     #[inline(always)]
-    fn rows(self) -> Self::Rows {
-        Registers(self.0)
-    }
-    #[inline(always)]
-    fn splat_rows(self, x: f64) -> [I::f64s; R] {
-        [self.0.splat_f64s(x); R]
-    }
-    #[inline(always)]
-    fn columns(self, rows: &[Self::N; LANES]) -> [[I::f64s; R]; LANES] {
-        self.turned(rows)
-    }
-    #[inline(always)]
-    fn add_up(self, sums: &[[I::f64s; R]], places: &[usize], out: &mut [f64]) {
+    fn add_up(self, sums: &[Self::Rows], places: &[usize], out: &mut [f64]) {
         for (part, some) in sums.chunks(Self::ROWS).enumerate() {
-            let mut rows = [self.rows().zero(); LANES];
+            let mut rows = [self.splat_rows(0.0); LANES];
             rows[..some.len()].copy_from_slice(some);
-            let rows = self.turned::<R, R>(&rows);
+            let rows = transposed::<I, R, R>(self.0, &rows);
             for (row, &place) in rows[..Self::ROWS].iter().zip(places) {
                 let to = &mut out[place + part * Self::ROWS..][..Self::ROWS];
                 if let Some(to) = I::as_mut_simd_f64s(to).0.first_chunk_mut() {
-                    *to = self.rows().add(*to, *row);
+                    *to = (Wide(self.0, *to) + *row).1;
                 }
             }
         }
     }
 }
 
-impl<I: Square, const N: usize, const R: usize> Registers<I, N, R> {
-    /// Transposes rows of `A` registers into columns of `B` registers.
-    #[inline(always)]
-    fn turned<const A: usize, const B: usize>(self, rows: &[[I::f64s; A]; LANES]) -> [[I::f64s; B]; LANES] {
-        let mut columns = [[self.0.splat_f64s(0.0); B]; LANES];
-        for a in 0..A {
-            for b in 0..B {
-                let mut square = [self.0.splat_f64s(0.0); LANES];
-                for i in 0..I::F64_LANES {
-                    square[i] = rows[b * I::F64_LANES + i][a];
-                }
-                self.0.transpose(&mut square[..I::F64_LANES]);
-                for i in 0..I::F64_LANES {
-                    columns[a * I::F64_LANES + i][b] = square[i];
-                }
+/// Transposes rows of `A` registers into columns of `B` registers.
+#[inline(always)]
+fn transposed<I: Square, const A: usize, const B: usize>(simd: I, rows: &[Wide<I, A>; LANES]) -> [Wide<I, B>; LANES] {
+    let zero = simd.splat_f64s(0.0);
+    let mut columns = [Wide(simd, [zero; B]); LANES];
+    for a in 0..A {
+        for b in 0..B {
+            let mut square = [zero; LANES];
+            for i in 0..I::F64_LANES {
+                square[i] = rows[b * I::F64_LANES + i].1[a];
+            }
+            simd.transpose(&mut square[..I::F64_LANES]);
+            for i in 0..I::F64_LANES {
+                columns[a * I::F64_LANES + i].1[b] = square[i];
             }
         }
-        columns
     }
+    columns
 }
 
 impl Square for Scalar {}
@@ -279,84 +332,6 @@ mod x86 {
     }
 }
 
-/// A number, or the lanes of a vector. Every operation rounds, so numbers and lanes agree bitwise.
-pub(crate) trait Lane:
-    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
-{
-    /// The constant `x` in the type of `self`.
-    fn constant(self, x: f64) -> Self;
-
-    /// `then` where `self` < `other`, and `otherwise` elsewhere.
-    fn where_less(self, other: Self, then: Self, otherwise: Self) -> Self;
-
-    /// |x|
-    fn abs(self) -> Self;
-}
-
-impl Lane for f64 {
-    #[inline(always)]
-    fn constant(self, x: f64) -> Self {
-        x
-    }
-
-    #[inline(always)]
-    fn where_less(self, other: Self, then: Self, otherwise: Self) -> Self {
-        if self < other { then } else { otherwise }
-    }
-
-    #[inline(always)]
-    fn abs(self) -> Self {
-        self.abs()
-    }
-}
-
-/// The lanes of a vector, with operators.
-pub(crate) struct Wide<S: Lanes>(pub S, pub S::N);
-
-impl<S: Lanes> Clone for Wide<S> {
-    #[inline(always)]
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-
-impl<S: Lanes> Copy for Wide<S> {}
-
-macro_rules! operator {
-    ($operator:ident, $method:ident) => {
-        impl<S: Lanes> $operator for Wide<S> {
-            type Output = Self;
-
-            #[inline(always)]
-            fn $method(self, other: Self) -> Self {
-                Self(self.0, self.0.$method(self.1, other.1))
-            }
-        }
-    };
-}
-
-operator!(Add, add);
-operator!(Sub, sub);
-operator!(Mul, mul);
-operator!(Div, div);
-
-impl<S: Lanes> Lane for Wide<S> {
-    #[inline(always)]
-    fn constant(self, x: f64) -> Self {
-        Self(self.0, self.0.splat(x))
-    }
-
-    #[inline(always)]
-    fn where_less(self, other: Self, then: Self, otherwise: Self) -> Self {
-        Self(self.0, self.0.where_less(self.1, other.1, then.1, otherwise.1))
-    }
-
-    #[inline(always)]
-    fn abs(self) -> Self {
-        Self(self.0, self.0.abs(self.1))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -377,7 +352,7 @@ mod tests {
     impl WithLanes for Everything<'_> {
         #[inline(always)]
         fn run<S: Lanes>(self, s: S) {
-            let mut rows = [s.zero(); LANES];
+            let mut rows = [s.splat(0.0); LANES];
             for (i, row) in rows.iter_mut().enumerate() {
                 *row = s.load(&std::array::from_fn(|k| entry(i, k)));
             }
@@ -386,16 +361,8 @@ mod tests {
             let places: Vec<usize> = (0..S::ROWS).map(|row| row * LANES).collect();
             s.add_up(&s.columns(&rows), &places, &mut written);
             let (a, b, c) = (rows[1], rows[2], s.splat(0.3));
-            let results = [
-                s.add(a, b),
-                s.mul(a, b),
-                s.mul_add(a, b, c),
-                s.mul_sub(a, b, c),
-                s.abs(a),
-                s.sub(a, b),
-                s.div(a, b),
-                s.where_less(a, b, c, a),
-            ];
+            let results =
+                [a + b, a * b, c.add_product(a, b), c.sub_product(a, b), a.abs(), a - b, a / b, a.where_less(b, c, a)];
             let mut out: Vec<[f64; LANES]> = written.as_chunks().0[..LANES].to_vec();
             out.truncate(S::ROWS);
             out.resize(LANES, [0.0; LANES]);

@@ -19,17 +19,18 @@ pub fn available() -> Option<u64> {
 
 /// `Max address space` of /proc/self/limits less `VmSize` of /proc/self/status, in bytes.
 fn address_space(limits: &str, status: &str) -> Option<u64> {
-    let value =
-        |text: &str, key| text.lines().find_map(|line| line.strip_prefix(key))?.split_whitespace().next()?.parse().ok();
-    let (limit, used): (u64, u64) = (value(limits, "Max address space")?, value(status, "VmSize:")?);
-    Some(limit.saturating_sub(used.saturating_mul(1024)))
+    let used = number_after(status, "VmSize:")?.saturating_mul(1024);
+    Some(number_after(limits, "Max address space")?.saturating_sub(used))
 }
 
 /// `MemAvailable:  123 kB` of /proc/meminfo, in bytes.
 fn meminfo(text: &str) -> Option<u64> {
-    let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
-    let kilobytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
-    kilobytes.checked_mul(1024)
+    number_after(text, "MemAvailable:")?.checked_mul(1024)
+}
+
+/// The number behind `key`, at the beginning of a line.
+fn number_after(text: &str, key: &str) -> Option<u64> {
+    text.lines().find_map(|line| line.strip_prefix(key))?.split_whitespace().next()?.parse().ok()
 }
 
 /// The rest of the limit of a control group (version 2), in bytes. Caches of files do not count as used.
@@ -37,8 +38,7 @@ fn limit_left(group: &Path) -> Option<u64> {
     let read = |name: &str| fs::read_to_string(group.join(name)).ok();
     let number = |name: &str| read(name)?.trim().parse::<u64>().ok();
     let (limit, used) = (number("memory.max")?, number("memory.current")?);
-    let cached = read("memory.stat")
-        .and_then(|text| text.lines().find_map(|line| line.strip_prefix("inactive_file ")?.parse::<u64>().ok()));
+    let cached = read("memory.stat").and_then(|text| number_after(&text, "inactive_file "));
     Some(limit.saturating_sub(used.saturating_sub(cached.unwrap_or(0))))
 }
 

@@ -1,6 +1,6 @@
 //! Work on all cores, in an order that does not depend on the number of cores.
 //!
-//! Threads receive tasks as `dyn Fn`. Their code is therefore compiled once, and not for every kind of work.
+//! Threads receive tasks as `dyn Fn`. Their code is therefore compiled once for each type of parts, and not for every kind of work.
 
 use rayon::prelude::*;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -23,27 +23,19 @@ pub(crate) fn several() -> bool {
     threads() > 1
 }
 
-/// Runs `task(0)`, …, `task(count − 1)`, each on any free thread.
-fn each(count: usize, task: &(dyn Fn(usize) + Sync)) {
-    if count > 1 && several() {
-        (0..count).into_par_iter().for_each(task);
-    } else {
-        (0..count).for_each(task);
-    }
-}
-
 /// Locks a mutex. The data stays usable after a thread panicked while it held the lock.
 pub(crate) fn held<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Calls `f(part)` for every part.
+/// Calls `f(part)` for every part, each on any free thread.
 pub(crate) fn for_each<P: Send>(parts: impl Iterator<Item = P>, f: &(dyn Fn(P) + Sync)) {
-    let parts: Vec<Mutex<Option<P>>> = parts.map(|part| Mutex::new(Some(part))).collect();
-    each(parts.len(), &|k| {
-        let part = held(&parts[k]).take();
-        part.into_iter().for_each(f);
-    });
+    let parts: Vec<P> = parts.collect();
+    if parts.len() > 1 && several() {
+        parts.into_par_iter().for_each(f);
+    } else {
+        parts.into_iter().for_each(f);
+    }
 }
 
 /// [`for_each`] with scratch space, which is reused from part to part.
@@ -62,10 +54,7 @@ pub(crate) fn for_each_with<P: Send, S: Send + Default>(
 
 /// `f(0)`, …, `f(count − 1)`.
 pub(crate) fn map<R: Send>(count: usize, f: &(dyn Fn(usize) -> R + Sync)) -> Vec<R> {
-    let mut results: Vec<Option<R>> = (0..count).map(|_| None).collect();
-    for_each(results.iter_mut().enumerate(), &|(k, result)| *result = Some(f(k)));
-    // Every result is present, so `flatten` drops none.
-    results.into_iter().flatten().collect()
+    if count > 1 && several() { (0..count).into_par_iter().map(f).collect() } else { (0..count).map(f).collect() }
 }
 
 /// Sorts by the keys, all of which differ.

@@ -200,28 +200,21 @@ impl<const D: usize> Particles<D> {
     /// grid.
     #[inline(always)]
     pub fn reference(&self) -> Reference<'_, D> {
-        let volume = &self.volume;
-        match &self.reference {
-            None => {
-                let Self { position, displacement_gradient, dilatation, .. } = self;
-                Reference { position, displacement_gradient, dilatation, volume }
-            }
-            Some(Configuration { position, displacement_gradient, dilatation }) => {
-                Reference { position, displacement_gradient, dilatation, volume }
-            }
-        }
+        let (position, displacement_gradient, dilatation) = match &self.reference {
+            None => (&self.position, &self.displacement_gradient, &self.dilatation),
+            Some(stored) => (&stored.position, &stored.displacement_gradient, &stored.dilatation),
+        };
+        Reference { position, displacement_gradient, dilatation, volume: &self.volume }
     }
 
     /// Stores the present configuration as the reference configuration, unless there is one.
     pub(crate) fn store_reference(&mut self) {
-        let Self { position, displacement_gradient, dilatation, .. } = &*self;
-        let present = || Configuration {
-            position: position.clone(),
-            displacement_gradient: displacement_gradient.clone(),
-            dilatation: dilatation.clone(),
-        };
         if self.reference.is_none() {
-            self.reference = Some(present());
+            self.reference = Some(Configuration {
+                position: self.position.clone(),
+                displacement_gradient: self.displacement_gradient.clone(),
+                dilatation: self.dilatation.clone(),
+            });
         }
     }
 
@@ -237,11 +230,6 @@ impl<const D: usize> Particles<D> {
         if bodies.iter().any(|body| body.law.internal_variables().len() > self.remembered) {
             self.set_internal_to_rest(bodies);
         }
-        self.make_room_for_dilatation(bodies);
-    }
-
-    /// Makes room for θ if a body averages it. New entries are at rest.
-    fn make_room_for_dilatation<L: Law>(&mut self, bodies: &[Body<L>]) {
         if bodies.iter().any(Body::averages) {
             self.dilatation.resize(self.len(), 0.0);
         }
@@ -262,7 +250,9 @@ impl<const D: usize> Particles<D> {
         };
         self.memory = self.body.iter().flat_map(at_rest).collect();
         self.dilatation.clear();
-        self.make_room_for_dilatation(bodies);
+        if bodies.iter().any(Body::averages) {
+            self.dilatation.resize(self.len(), 0.0);
+        }
     }
 
     /// The places of the particles in memory, by id.

@@ -6,10 +6,10 @@ pub use arrays::ArrayUse;
 
 use crate::approximation::ShapeFunction;
 use crate::material::Law;
-use crate::mechanics::loads::{Motion, PrescribedDof, Pressing, SurfaceLoad};
+use crate::mechanics::loads::{Motion, Pressing, SurfaceLoad};
 use crate::mechanics::reference::GridReset;
 use crate::mechanics::sweep::{SupportError, Supports};
-use crate::mechanics::terms::{Given, Terms};
+use crate::mechanics::terms::planned;
 use crate::mechanics::unknowns::Unknowns;
 use crate::particles::Body;
 use crate::simulation::{Sharing, Simulation};
@@ -65,13 +65,6 @@ impl SurfaceUse {
             area: load.points.iter().map(|point| point.area).sum(),
         };
         simulation.loads.surface.iter().map(describe).collect()
-    }
-}
-
-impl Display for SurfaceUse {
-    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
-        let Self { load, points, area } = self;
-        write!(f, "{load} on {points} points, area {area:.6} in all")
     }
 }
 
@@ -141,12 +134,14 @@ impl Plan {
         let supports = simulation.new_supports(None)?;
         let nodes = supports.active();
         let prescribed = simulation.prescribed(nodes);
+        let following = Unknowns::new(&supports, &prescribed).following_mask(supports.nodes());
+        let following: usize = following.into_iter().map(usize::from).sum();
         Ok(Self {
             dimension: D,
             particles: simulation.particles.solid_places().len(),
             grid_nodes: simulation.grid.node_count(),
             active_nodes: nodes.len(),
-            unknowns: unknowns(&supports, &prescribed),
+            unknowns: D * supports.nodes() - prescribed.len() - following,
             grid_reset: simulation.settings.grid_reset,
             krylov: simulation.krylov(),
             preconditioner: simulation.preconditioner(),
@@ -183,13 +178,6 @@ impl Plan {
     }
 }
 
-/// The number of nodal values to solve for.
-fn unknowns<const D: usize>(supports: &Supports<D>, prescribed: &[PrescribedDof]) -> usize {
-    let unknowns = Unknowns::new(supports, prescribed);
-    let follow: usize = unknowns.following_mask(supports.nodes()).into_iter().map(usize::from).sum();
-    D * supports.nodes() - prescribed.len() - follow
-}
-
 /// Bodies that share nodes, and how far apart they are.
 fn sharing<const D: usize, L: Law, A: ShapeFunction>(
     simulation: &Simulation<D, L, A>,
@@ -212,41 +200,23 @@ fn terms<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, supports: 
     let smooths = scheme.has_inertia() && settings.smoothing.is_some();
     let moving = loads.prescribed.iter().flat_map(|one| &one.motion).flatten().any(|motion| *motion != Motion::Rest);
     let averages = simulation.bodies.iter().any(Body::averages);
-    let mut all = Terms::<D, L>::planned(Given {
-        loads,
-        scheme,
-        lumping: settings.lumping,
-        averages,
-        may_reset: simulation.may_reset(),
+    let aggregated = supports.extension().map_or("only with aggregation".into(), |extension| {
+        format!("{} of {} active nodes follow well-supported ones", extension.len(), supports.nodes())
     });
+    let choice_of_laws = match simulation.bodies.len() {
+        1 => "only with several bodies; the law of the only one is looked up once in a pass over the particles".into(),
+        count => format!("the law of each of {count} bodies is looked up once in a pass over the particles"),
+    };
+    let mut all = planned(loads, scheme, settings.lumping, averages, simulation.may_reset());
     all.extend([
-        ("aggregation", settings.aggregation, aggregated(supports)),
+        ("aggregation", settings.aggregation, aggregated),
         ("smoothing", smooths, "only with a transfer other than flip".into()),
-        ("choice of laws", simulation.bodies.len() > 1, choice_of_laws(simulation)),
+        ("choice of laws", simulation.bodies.len() > 1, choice_of_laws),
         ("third axis", D == 3, format!("grid.size has {D} components: so has every vector")),
         ("prescribed nodes", !loads.prescribed.is_empty(), format!("{} conditions", loads.prescribed.len())),
         ("work of moving walls", moving, "only where a prescribed motion does not rest".into()),
     ]);
     all.into_iter().map(|(name, used, why)| TermUse { name, used, why }).collect()
-}
-
-/// The number of nodes that follow others, in words.
-fn aggregated<const D: usize>(supports: &Supports<D>) -> String {
-    match supports.extension() {
-        None => "only with aggregation".into(),
-        Some(extension) => {
-            format!("{} of {} active nodes follow well-supported ones", extension.len(), supports.nodes())
-        }
-    }
-}
-
-/// The frequency at which the loop over particles looks up the law, in words.
-fn choice_of_laws<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>) -> String {
-    match simulation.bodies.len() {
-        1 => "only with several bodies; the law of the only one is looked up once in a pass over the particles"
-            .to_owned(),
-        count => format!("the law of each of {count} bodies is looked up once in a pass over the particles"),
-    }
 }
 
 impl Display for Plan {
@@ -265,8 +235,8 @@ impl Display for Plan {
         for term in &self.terms {
             writeln!(f, "  {} {:<22} {}", if term.used { "on " } else { "off" }, term.name, term.why)?;
         }
-        for surface in &self.surfaces {
-            writeln!(f, "  surface: {surface}")?;
+        for SurfaceUse { load, points, area } in &self.surfaces {
+            writeln!(f, "  surface: {load} on {points} points, area {area:.6} in all")?;
         }
         for bodies in &self.sharing {
             writeln!(f, "contact       {bodies}")?;

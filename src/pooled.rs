@@ -50,10 +50,7 @@ impl<const N: usize> Element for [f64; N] {}
 impl Pool {
     /// A vector of `count` times `value`.
     pub fn filled<T: Element>(&self, count: usize, value: T) -> Pooled<T> {
-        let mut vector = self.taken(count);
-        vector.clear();
-        vector.resize(count, value);
-        Pooled { vector, pool: self.clone() }
+        self.collect(std::iter::repeat_n(value, count))
     }
 
     /// A vector of `count` unspecified elements, to be overwritten. Elements beyond the old contents are `value`.
@@ -97,6 +94,7 @@ impl Pool {
 }
 
 /// A vector on loan from a [`Pool`].
+#[derive(Debug)]
 pub struct Pooled<T: Element> {
     vector: Vec<T>,
     pool: Pool,
@@ -133,27 +131,21 @@ impl<T: Element + PartialEq> PartialEq for Pooled<T> {
     }
 }
 
-impl<T: Element> From<Vec<T>> for Pooled<T> {
-    fn from(vector: Vec<T>) -> Self {
-        Self { vector, pool: Pool::default() }
-    }
-}
-
 impl<T: Element> Default for Pooled<T> {
     fn default() -> Self {
         Vec::new().into()
     }
 }
 
-impl<T: Element> Clone for Pooled<T> {
-    fn clone(&self) -> Self {
-        self.pool.collect(self.iter().copied())
+impl<T: Element> From<Vec<T>> for Pooled<T> {
+    fn from(vector: Vec<T>) -> Self {
+        Self { vector, pool: Pool::default() }
     }
 }
 
-impl<T: Element + std::fmt::Debug> std::fmt::Debug for Pooled<T> {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        self.vector.fmt(f)
+impl<T: Element> Clone for Pooled<T> {
+    fn clone(&self) -> Self {
+        self.pool.collect(self.iter().copied())
     }
 }
 

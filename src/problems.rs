@@ -11,29 +11,43 @@ pub(crate) const MOST: usize = 1000;
 /// The most characters shown of a value.
 const SHOWN: usize = 80;
 
+/// The most characters shown of a message, which may quote the text.
+const MESSAGE: usize = 600;
+
+/// The most characters shown of a path, about twice the longest path of a real scene.
+const PATH: usize = 160;
+
 /// The largest length, time or modulus allowed. Squares and products of allowed numbers then stay finite.
 pub(crate) const LARGEST: f64 = 1e100;
 
 /// One problem in a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Problem {
-    /// The key, such as `bodies[0].density`.
+    /// The key, such as `bodies[0].density`; empty if the text is not JSON.
     pub path: String,
-    /// The value found.
-    pub value: String,
-    /// The values allowed.
-    pub allowed: String,
+    /// What is wrong, such as `-1 is not allowed; must be finite and > 0`.
+    pub message: String,
     /// The place of the value; unknown for keys that are absent.
     pub place: Option<Place>,
 }
 
 impl Display for Problem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: {} is not allowed; {}", self.path, self.value, self.allowed)?;
+        let separator = if self.path.is_empty() { "" } else { ": " };
+        // Nobody reads a path through a hundred brackets.
+        write!(f, "{}{separator}{}", cut(&self.path, PATH), cut(&self.message, MESSAGE))?;
         match &self.place {
             Some(place) => write!(f, "\n{place}"),
             None => Ok(()),
         }
+    }
+}
+
+/// The first characters of a text, with a mark where the text goes on.
+fn cut(text: &str, most: usize) -> String {
+    match text.char_indices().nth(most) {
+        Some((end, _)) => format!("{}…", &text[..end]),
+        None => text.to_owned(),
     }
 }
 
@@ -100,16 +114,16 @@ impl Problems {
             self.more += 1;
             return;
         }
-        let (path, allowed) = (path.to_owned(), allowed.to_string());
-        let value = value.to_string().chars().take(SHOWN).collect();
-        self.list.push(Problem { path, value, allowed, place: None });
+        let message = format!("{} is not allowed; {allowed}", cut(&value.to_string(), SHOWN));
+        self.list.push(Problem { path: path.to_owned(), message, place: None });
     }
 
-    /// Adds a problem unless `ok`.
-    pub(crate) fn require(&mut self, ok: bool, path: &str, value: impl Display, allowed: impl Display) {
+    /// Adds a problem unless `ok`. Returns `ok`.
+    pub(crate) fn require(&mut self, ok: bool, path: &str, value: impl Display, allowed: impl Display) -> bool {
         if !ok {
             self.refuse(path, value, allowed);
         }
+        ok
     }
 
     /// Checks that a number has a sensible size.
@@ -122,11 +136,8 @@ impl Problems {
     /// Checks that a number has a sensible size and is > 0.
     pub(crate) fn positive(&mut self, path: &str, x: f64) -> bool {
         let ok = sensible(x) && x > 1.0 / LARGEST;
-        let allowed = if x > 0.0 {
-            format!("must be greater than {:e} and at most {LARGEST:e}", 1.0 / LARGEST)
-        } else {
-            "must be finite and > 0".into()
-        };
+        let bounds = format!("must be greater than {:e} and at most {LARGEST:e}", 1.0 / LARGEST);
+        let allowed = if x > 0.0 { &bounds } else { "must be finite and > 0" };
         self.require(ok, path, Number(x), allowed);
         ok
     }
@@ -146,12 +157,8 @@ impl Problems {
     /// Checks the length of a list. A list that is too long is returned empty, so that its entries are not checked.
     pub(crate) fn few<'a, T>(&mut self, path: &str, list: &'a [T]) -> &'a [T] {
         let ok = list.len() <= MOST;
-        self.require(
-            ok,
-            path,
-            format_args!("a list of {}", list.len()),
-            format_args!("must have at most {MOST} entries"),
-        );
+        let allowed = format_args!("must have at most {MOST} entries");
+        self.require(ok, path, format_args!("a list of {}", list.len()), allowed);
         if ok { list } else { &[] }
     }
 
@@ -168,22 +175,16 @@ impl Problems {
     /// Checks that there is one entry per dimension.
     pub(crate) fn length(&mut self, path: &str, entries: usize, dimension: usize) -> bool {
         let ok = entries == dimension;
-        self.require(
-            ok,
-            path,
-            format_args!("a vector of length {entries}"),
-            format_args!("must have {dimension} components, as many as grid.size"),
-        );
+        let allowed = format_args!("must have {dimension} components, as many as grid.size");
+        self.require(ok, path, format_args!("a vector of length {entries}"), allowed);
         ok
     }
 }
 
 impl Display for Problems {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (i, problem) in self.list.iter().enumerate() {
-            let separator = if i == 0 { "" } else { "\n" };
-            write!(f, "{separator}{problem}")?;
-        }
+        let list: Vec<String> = self.list.iter().map(ToString::to_string).collect();
+        f.write_str(&list.join("\n"))?;
         if self.more > 0 { write!(f, "\n… and {} more", self.more) } else { Ok(()) }
     }
 }

@@ -37,11 +37,7 @@ pub fn identity<T: Real, const D: usize>() -> Tensor<T, D> {
 /// ```
 #[inline(always)]
 pub fn trace<T: Real, const D: usize>(a: &Tensor<T, D>) -> T {
-    let mut sum = T::zero();
-    for i in 0..D {
-        sum += a[(i, i)];
-    }
-    sum
+    (0..D).fold(T::zero(), |sum, i| sum + a[(i, i)])
 }
 
 /// A : B = Σ Aᵢⱼ Bᵢⱼ
@@ -56,13 +52,7 @@ pub fn trace<T: Real, const D: usize>(a: &Tensor<T, D>) -> T {
 /// ```
 #[inline(always)]
 pub fn contract<T: Real, const D: usize>(a: &Tensor<T, D>, b: &Tensor<T, D>) -> T {
-    let mut sum = T::zero();
-    for k in 0..D {
-        for i in 0..D {
-            sum += a[(i, k)] * b[(i, k)];
-        }
-    }
-    sum
+    a.as_slice().iter().zip(b.as_slice()).fold(T::zero(), |sum, (&a, &b)| sum + a * b)
 }
 
 /// a ⊗ b

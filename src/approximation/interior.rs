@@ -1,7 +1,7 @@
 //! Shape functions away from walls. There the functions depend only on the position in the cell, so their code has no branch. The code runs
 //! on one number or on the lanes of a vector.
 
-use crate::lanes::{LANES, Lane, Lanes, Wide, WithLanes, widest};
+use crate::lanes::{LANES, Lane, Lanes, WithLanes, widest};
 
 /// The largest number of nodes on a side, beyond those of the cell, for which vector lanes have room.
 pub(crate) const FURTHEST: usize = 4;
@@ -105,20 +105,19 @@ impl<I: Interior, const M: usize> WithLanes for Evaluate<'_, '_, I, M> {
     #[inline(always)]
     fn run<S: Lanes>(self, s: S) {
         let Self { interior, radius, points, starts, out } = self;
-        let wide = |x: &[f64; LANES]| Wide(s, s.load(x));
-        let (below, above) = (wide(&points.below), wide(&points.above));
-        let column = interior.column::<_, M>(below, above, wide(&starts), points.spacing);
+        let (below, above) = (s.load(&points.below), s.load(&points.above));
+        let column = interior.column::<_, M>(below, above, s.load(&starts), points.spacing);
         let mut smallest = below.constant(f64::INFINITY);
         for i in 0..2 * M + 2 {
             let (n, dn) = (column.values[i], column.derivatives[i]);
-            s.store(n.1, &mut out.values[i]);
-            s.store(dn.1, &mut out.derivatives[i]);
+            s.store(n, &mut out.values[i]);
+            s.store(dn, &mut out.derivatives[i]);
             let (distance, j) = if i <= M { (below, M - i) } else { (above, i - M - 1) };
             let room = below.constant(radius) - distance;
             let size = if j == 0 { n.abs() } else { room.constant(j as f64).where_less(room, n.abs(), smallest) };
             smallest = size.where_less(smallest, size, smallest);
         }
-        s.store(smallest.1, out.smallest);
-        s.store(column.correction.1, out.corrections);
+        s.store(smallest, out.smallest);
+        s.store(column.correction, out.corrections);
     }
 }

@@ -52,12 +52,11 @@ use crate::output::snapshots::multiples;
 use crate::output::{Mark, OutputError, Recorder};
 use crate::particles::Particles;
 use crate::simulation::Simulation;
-use container::{Array, Damage};
+use container::{Arrays, Damage};
 use difference::Difference;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use std::fs::File;
-use std::io::{BufReader, ErrorKind};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 /// The two files, written in turn.
@@ -286,13 +285,6 @@ pub struct Restored {
     pub other_program: Option<String>,
 }
 
-struct Candidate {
-    slot: usize,
-    path: PathBuf,
-    content: Content,
-    arrays: Vec<Array>,
-}
-
 /// Restores the last good checkpoint in `directory`. Before, the simulation must be in its state at the start of the run `identity`.
 ///
 /// # Errors
@@ -306,7 +298,7 @@ pub fn restore<const D: usize, L, A>(
     for (slot, name) in NAMES.iter().enumerate() {
         let path = directory.join(name);
         match read(&path) {
-            Ok((content, arrays)) => candidates.push(Candidate { slot, path, content, arrays }),
+            Ok((content, arrays)) => candidates.push((slot, path, content, arrays)),
             Err(Damage::Io(error)) if error.kind() == ErrorKind::NotFound => {}
             Err(damage) => unusable.push(Unusable { path, reason: damage.to_string() }),
         }
@@ -314,8 +306,8 @@ pub fn restore<const D: usize, L, A>(
     if candidates.is_empty() && unusable.is_empty() {
         return Err(CheckpointError::Absent { directory: directory.to_owned() });
     }
-    candidates.sort_by_key(|candidate| std::cmp::Reverse(candidate.content.clock.steps()));
-    for Candidate { slot, path, content, arrays } in candidates {
+    candidates.sort_by_key(|(_, _, content, _)| std::cmp::Reverse(content.clock.steps()));
+    for (slot, path, content, arrays) in candidates {
         let Content { program, identity: then, command: _, clock, mark } = content;
         identity.check(&then, &path)?;
         let files = mark.check(directory).map_err(|error| error.to_string());
@@ -331,10 +323,8 @@ pub fn restore<const D: usize, L, A>(
     Err(CheckpointError::NoneGood { directory: directory.to_owned(), unusable })
 }
 
-fn read(path: &Path) -> Result<(Content, Vec<Array>), Damage> {
-    let file = File::open(path)?;
-    let length = file.metadata()?.len();
-    container::read(BufReader::new(file), length)
+fn read(path: &Path) -> Result<(Content, Arrays), Damage> {
+    container::read(&std::fs::read(path)?)
 }
 
 /// A killed or interrupted run that can be continued.
@@ -349,19 +339,15 @@ pub struct Unfinished {
 /// The killed or interrupted run in `directory`, if it has a readable checkpoint.
 pub fn unfinished(directory: &Path) -> Option<Unfinished> {
     // A killed run wrote no report.
-    let over = outcome(directory).is_some_and(|outcome| outcome != "interrupted");
+    let report = std::fs::read(directory.join("report.json")).ok();
+    let report = report.and_then(|text| serde_json::from_slice::<Value>(&text).ok());
+    let over = report.is_some_and(|report| report["outcome"] != "interrupted");
     let readable = NAMES.iter().filter_map(|name| {
         let path = directory.join(name);
         let (content, _) = read(&path).ok()?;
         Some(Unfinished { path, steps: content.clock.steps() })
     });
     readable.max_by_key(|one| one.steps).filter(|_| !over)
-}
-
-/// The outcome in the report of the run in `directory`.
-fn outcome(directory: &Path) -> Option<Value> {
-    let text = std::fs::read(directory.join("report.json")).ok()?;
-    Some(serde_json::from_slice::<Value>(&text).ok()?["outcome"].take())
 }
 
 /// Removes the checkpoints of an earlier run, so that a new run in the directory is not continued from them.

@@ -1,18 +1,24 @@
 //! The state at tₙ: everything that a step takes from the previous step, and nothing else.
 
-use super::container::Array;
+use super::container::Arrays;
 use crate::clock::Reached;
 use crate::mechanics::loads::{Loads, Reaction};
 use crate::mechanics::path::Path;
-use crate::mechanics::reference::{GridState, LastEquilibrium};
+use crate::mechanics::reference::LastEquilibrium;
+use crate::mechanics::transfer::Nodal;
 use crate::particles::{Configuration, Particles};
+use crate::pooled::{Element, Pool, Pooled};
 use crate::simulation::{History, Simulation};
-use crate::tensor::{Tensor, Vector};
+use crate::tensor::Vector;
+use bytemuck::Pod;
 use crc32fast::hash;
 use std::borrow::Cow;
 
 /// The name of an array and its numbers.
 type NamedArray<'a> = (&'static str, Cow<'a, [f64]>);
+
+/// Prefixes of arrays that may be absent or vary in length.
+const VARYING: [&str; 4] = ["reference_", "grid_", "bonded", "equilibrium"];
 
 /// The arrays of the state at tₙ, by name. The patterns name every field: a new field does not compile until somebody decides whether it is
 /// stored. A new array is added here and in [`restore`].
@@ -28,7 +34,7 @@ pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) 
         external_work,
         dissipated,
         path: Path { load, increment, speed, weight },
-        history: History { grid, constrained, bonded, equilibrium },
+        history: History { grid, rate, constrained, bonded, equilibrium },
         workspace: _,
     } = simulation;
     let Particles {
@@ -45,119 +51,102 @@ pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) 
         dilatation,
         reference,
     } = particles;
-    let id: Vec<f64> = id.iter().map(|&id| f64::from(id)).collect();
-    let conditions = 0..loads.prescribed.len();
-    let constrained: Vec<f64> = conditions.map(|one| u8::from(constrained.contains(&one)).into()).collect();
+    // Whether each prescribed condition has held bodies since the first step.
+    let constrained = (0..loads.prescribed.len()).map(|one| f64::from(u8::from(constrained.contains(&one))));
     let mut arrays: Vec<NamedArray<'_>> = vec![
-        ("id", id.into()),
-        (CONSTRAINED, constrained.into()),
-        (BONDED, bonded.iter().flatten().map(|&body| f64::from(body)).collect()),
-        ("position", bytemuck::cast_slice(position).into()),
-        ("velocity", bytemuck::cast_slice(velocity).into()),
-        ("acceleration", bytemuck::cast_slice(acceleration).into()),
-        ("displacement_gradient", bytemuck::cast_slice(displacement_gradient).into()),
-        ("memory", memory.as_slice().into()),
-        ("dilatation", dilatation.as_slice().into()),
+        ("id", id.iter().map(|&id| f64::from(id)).collect()),
+        ("constrained", constrained.collect()),
+        ("bonded", bonded.iter().flatten().map(|&body| f64::from(body)).collect()),
+        ("position", numbers(position)),
+        ("velocity", numbers(velocity)),
+        ("acceleration", numbers(acceleration)),
+        ("displacement_gradient", numbers(displacement_gradient)),
+        ("memory", numbers(memory)),
+        ("dilatation", numbers(dilatation)),
         ("external_work", std::slice::from_ref(external_work).into()),
         ("dissipated", std::slice::from_ref(dissipated).into()),
         ("path", vec![*load, *increment, *speed, *weight].into()),
     ];
-    arrays.extend(reference.iter().flat_map(reference_arrays));
-    arrays.extend(grid.iter().flat_map(grid_arrays));
-    arrays.extend(equilibrium.iter().flat_map(equilibrium_arrays));
+    if let Some(Configuration { position, displacement_gradient, dilatation }) = reference {
+        arrays.extend([
+            ("reference_position", numbers(position)),
+            ("reference_displacement_gradient", numbers(displacement_gradient)),
+            ("reference_dilatation", numbers(dilatation)),
+        ]);
+    }
+    if let Some(Nodal { mass: _, iterations: _, motion, velocity, acceleration, out_of_balance }) = grid {
+        arrays.extend([
+            ("grid_motion", numbers(motion)),
+            ("grid_rate", numbers(rate)),
+            ("grid_velocity", numbers(velocity)),
+            ("grid_acceleration", numbers(acceleration)),
+            ("grid_out_of_balance", numbers(out_of_balance)),
+        ]);
+    }
+    // The loads of the last equilibrium are those of the scene.
+    if let Some(LastEquilibrium { loads: _, reactions, touching, field_positions }) = equilibrium {
+        let forces = reactions.iter().flat_map(|one| one.force.iter().copied().chain([one.torque]));
+        arrays.extend([
+            ("equilibrium", std::iter::once(f64::from(u8::from(*touching))).chain(forces).collect()),
+            ("equilibrium_field_positions", numbers(field_positions)),
+        ]);
+    }
     arrays
 }
 
-/// The arrays of the reference configuration.
-fn reference_arrays<const D: usize>(reference: &Configuration<D>) -> [NamedArray<'_>; 3] {
-    let Configuration { position, displacement_gradient, dilatation } = reference;
-    [
-        (REFERENCE_POSITION, bytemuck::cast_slice(position).into()),
-        (REFERENCE_GRADIENT, bytemuck::cast_slice(displacement_gradient).into()),
-        (REFERENCE_DILATATION, dilatation.as_slice().into()),
-    ]
+fn numbers<T: Pod>(values: &[T]) -> Cow<'_, [f64]> {
+    bytemuck::cast_slice(values).into()
 }
 
-/// The arrays of a grid that is not reset.
-fn grid_arrays<const D: usize>(grid: &GridState<D>) -> impl Iterator<Item = NamedArray<'_>> {
-    let GridState { motion, rate, velocity, acceleration, out_of_balance } = grid;
-    let fields = [motion, rate, velocity, acceleration, out_of_balance];
-    GRID.into_iter().zip(fields.map(|field| bytemuck::cast_slice(field).into()))
-}
-
-/// The arrays of the last converged load step. Its loads are those of the scene.
-fn equilibrium_arrays<const D: usize>(equilibrium: &LastEquilibrium<D>) -> [NamedArray<'_>; 2] {
-    let LastEquilibrium { loads: _, reactions, touching, field_positions } = equilibrium;
-    let forces = reactions.iter().flat_map(|one| one.force.iter().copied().chain([one.torque]));
-    [
-        (EQUILIBRIUM, std::iter::once(f64::from(u8::from(*touching))).chain(forces).collect()),
-        (FIELD_POSITIONS, bytemuck::cast_slice(field_positions).into()),
-    ]
-}
-
-/// Whether each prescribed condition has held bodies since the first step.
-const CONSTRAINED: &str = "constrained";
-
-/// Pairs of bonded bodies.
-const BONDED: &str = "bonded";
-
-/// x, H and θ − 1 of the particles in the reference configuration, if the grid is not reset.
-const REFERENCE_POSITION: &str = "reference_position";
-const REFERENCE_GRADIENT: &str = "reference_displacement_gradient";
-const REFERENCE_DILATATION: &str = "reference_dilatation";
-
-/// The fields of [`GridState`].
-const GRID: [&str; 5] = ["grid_motion", "grid_rate", "grid_velocity", "grid_acceleration", "grid_out_of_balance"];
-
-/// The last load step: whether bodies touched, then the reactions.
-const EQUILIBRIUM: &str = "equilibrium";
-
-/// The positions at which the last load step evaluated a force field, by particle id.
-const FIELD_POSITIONS: &str = "equilibrium_field_positions";
-
-/// Prefixes of arrays that may be absent or vary in length.
-const VARYING: [&str; 4] = ["reference_", "grid_", BONDED, EQUILIBRIUM];
-
-/// The numbers of an array; none if there is no such array.
-fn numbers<'a>(arrays: &'a [Array], name: &str) -> &'a [f64] {
-    arrays.iter().find(|array| array.name == name).map_or(&[], |array| &array.values)
-}
-
-fn vectors<const D: usize>(numbers: &[f64]) -> Vec<Vector<f64, D>> {
-    numbers.chunks_exact(D).map(Vector::from_column_slice).collect()
+/// The values of an array; none if there is no such array.
+fn values<T: Pod>(arrays: &Arrays, name: &str) -> Vec<T> {
+    let numbers = arrays.get(name).map_or(&[][..], Vec::as_slice);
+    bytemuck::try_cast_slice(numbers).map(<[T]>::to_vec).unwrap_or_default()
 }
 
 /// The reference configuration, if there is one.
 ///
 /// # Errors
 /// An array does not fit the number of particles.
-fn reference<const D: usize>(arrays: &[Array], particles: usize) -> Result<Option<Configuration<D>>, String> {
-    let gradient = numbers(arrays, REFERENCE_GRADIENT);
-    if gradient.is_empty() {
+fn reference<const D: usize>(arrays: &Arrays, particles: usize) -> Result<Option<Configuration<D>>, String> {
+    let reference = Configuration::<D> {
+        position: values(arrays, "reference_position"),
+        displacement_gradient: values(arrays, "reference_displacement_gradient"),
+        dilatation: values(arrays, "reference_dilatation"),
+    };
+    let Configuration { position, displacement_gradient, dilatation } = &reference;
+    if displacement_gradient.is_empty() {
         return Ok(None);
     }
-    let displacement_gradient: Vec<_> = gradient.chunks_exact(D * D).map(Tensor::from_column_slice).collect();
-    let position = vectors(numbers(arrays, REFERENCE_POSITION));
-    let dilatation = numbers(arrays, REFERENCE_DILATATION).to_vec();
     let fits =
         [position.len(), displacement_gradient.len()] == [particles; 2] && [0, particles].contains(&dilatation.len());
-    let reference = Configuration { position, displacement_gradient, dilatation };
     if fits { Ok(Some(reference)) } else { Err("a reference configuration of other particles".into()) }
 }
 
-/// The nodal state of a grid that is not reset, if there is one. Its number of nodes cannot be checked here, because only a step knows it.
+/// The state of the nodes of a grid that is not reset, if there is one, and Δφ/Δt. The number of nodes cannot be checked here, because only
+/// a step knows it.
 ///
 /// # Errors
 /// The nodal fields differ in length.
-fn grid_state<const D: usize>(arrays: &[Array]) -> Result<Option<GridState<D>>, String> {
-    let [motion, rate, velocity, acceleration, out_of_balance] = GRID.map(|name| vectors(numbers(arrays, name)));
-    if motion.is_empty() {
+fn grid<const D: usize>(arrays: &Arrays) -> Result<Option<(Nodal<D>, Vec<Vector<f64, D>>)>, String> {
+    fn field<T: Element>(arrays: &Arrays, name: &str) -> Pooled<T> {
+        Pool::default().collect(values(arrays, name))
+    }
+    let nodal = Nodal::<D> {
+        motion: field(arrays, "grid_motion"),
+        velocity: field(arrays, "grid_velocity"),
+        acceleration: field(arrays, "grid_acceleration"),
+        out_of_balance: field(arrays, "grid_out_of_balance"),
+        ..Nodal::default()
+    };
+    let rate = values(arrays, "grid_rate");
+    let nodes = nodal.motion.len();
+    if nodes == 0 {
         return Ok(None);
     }
-    let optional = [&velocity, &acceleration, &out_of_balance];
-    let fits = rate.len() == motion.len() && optional.iter().all(|field| [0, motion.len()].contains(&field.len()));
-    let state = GridState { motion, rate, velocity, acceleration, out_of_balance };
-    if fits { Ok(Some(state)) } else { Err("nodal fields of different lengths".into()) }
+    let optional = [&nodal.velocity, &nodal.acceleration, &nodal.out_of_balance];
+    let fits = rate.len() == nodes && optional.iter().all(|field| [0, nodes].contains(&field.len()));
+    if fits { Ok(Some((nodal, rate))) } else { Err("nodal fields of different lengths".into()) }
 }
 
 /// The last converged load step under the loads of the scene, if the checkpoint has it.
@@ -165,12 +154,13 @@ fn grid_state<const D: usize>(arrays: &[Array]) -> Result<Option<GridState<D>>, 
 /// # Errors
 /// An array does not fit the number of particles or of prescribed conditions.
 fn equilibrium<const D: usize>(
-    arrays: &[Array],
+    arrays: &Arrays,
     particles: usize,
     loads: &Loads<D>,
 ) -> Result<Option<LastEquilibrium<D>>, String> {
-    let Some((touching, forces)) = numbers(arrays, EQUILIBRIUM).split_first() else { return Ok(None) };
-    let positions = vectors(numbers(arrays, FIELD_POSITIONS));
+    let numbers: Vec<f64> = values(arrays, "equilibrium");
+    let Some((touching, forces)) = numbers.split_first() else { return Ok(None) };
+    let positions: Vec<Vector<f64, D>> = values(arrays, "equilibrium_field_positions");
     let expected = if loads.field.is_some() { particles } else { 0 };
     if forces.len() != loads.prescribed.len() * (D + 1) || positions.len() != expected {
         return Err("the last equilibrium of other particles or conditions".into());
@@ -197,59 +187,56 @@ fn order(present: &[u32], ids: &[f64]) -> Option<Vec<u32>> {
 pub(super) fn restore<const D: usize, L, A>(
     simulation: &mut Simulation<D, L, A>,
     reached: Reached,
-    arrays: &[Array],
+    arrays: &Arrays,
 ) -> Result<(), String> {
     let varies = |name: &str| VARYING.iter().any(|start| name.starts_with(start));
     for (name, values) in inherited(simulation).into_iter().filter(|(name, _)| !varies(name)) {
-        let found = arrays.iter().find(|array| array.name == name).ok_or_else(|| format!("no array {name}"))?;
-        if found.values.len() != values.len() {
-            return Err(format!("{} numbers of {name} instead of {}", found.values.len(), values.len()));
+        let found = arrays.get(name).ok_or_else(|| format!("no array {name}"))?;
+        if found.len() != values.len() {
+            return Err(format!("{} numbers of {name} instead of {}", found.len(), values.len()));
         }
     }
-    let ids =
-        arrays.iter().filter(|array| array.name == "id").flat_map(|array| &array.values).copied().collect::<Vec<_>>();
-    let order = order(&simulation.particles.id, &ids).ok_or("ids that are not those of the particles")?;
+    let order = order(&simulation.particles.id, &arrays["id"]).ok_or("ids that are not those of the particles")?;
     let count = simulation.particles.len();
-    let (reference, grid) = (reference(arrays, count)?, grid_state(arrays)?);
+    let (reference, grid) = (reference(arrays, count)?, grid(arrays)?);
     if reference.is_some() != grid.is_some() {
         return Err("a reference configuration without nodal fields, or the reverse".into());
     }
-    // Particle data without an array is rearranged, too.
     let clock = simulation.clock.at(reached).ok_or("a time that the clock cannot show")?;
     let equilibrium = equilibrium(arrays, count, &simulation.loads)?;
     simulation.clock = clock;
     simulation.forget();
     simulation.history.equilibrium = equilibrium;
+    // Particle data without an array is rearranged, too.
     simulation.rearrange(&order);
     simulation.particles.reference = reference;
-    simulation.history.grid = grid;
-    mutant!("checkpoint: a restart resets the grid": { (simulation.history.grid, simulation.particles.reference) = (None, None); });
-    let pairs = numbers(arrays, BONDED).chunks_exact(2);
-    mutant!("checkpoint: bonded bodies are forgotten": pairs = numbers(arrays, "").chunks_exact(2));
-    simulation.history.bonded = pairs.map(|pair| [pair[0] as u32, pair[1] as u32]).collect();
-    let constrained = numbers(arrays, CONSTRAINED).iter().enumerate();
-    simulation.history.constrained = constrained.filter(|(_, flag)| **flag > 0.0).map(|(one, _)| one).collect();
-    let path = &mut simulation.path;
-    let stored = [&mut path.load, &mut path.increment, &mut path.speed, &mut path.weight];
-    for (number, &value) in stored.into_iter().zip(numbers(arrays, "path")) {
-        mutant!("checkpoint: the length of the step along a path is forgotten": { continue; });
-        *number = value;
+    if let Some((nodal, rate)) = grid {
+        (simulation.history.grid, simulation.history.rate) = (Some(nodal), rate);
     }
-    let particles = &mut simulation.particles;
-    for Array { name, values } in arrays {
-        let into: &mut [f64] = match name.as_str() {
-            "position" => bytemuck::cast_slice_mut(&mut particles.position),
-            "velocity" => bytemuck::cast_slice_mut(&mut particles.velocity),
-            "acceleration" => bytemuck::cast_slice_mut(&mut particles.acceleration),
-            "displacement_gradient" => bytemuck::cast_slice_mut(&mut particles.displacement_gradient),
-            "memory" => &mut particles.memory,
-            "dilatation" => &mut particles.dilatation,
-            "dissipated" => std::slice::from_mut(&mut simulation.dissipated),
-            "external_work" => std::slice::from_mut(&mut simulation.external_work),
-            _ => continue,
-        };
+    mutant!("checkpoint: a restart resets the grid": { (simulation.history.grid, simulation.particles.reference) = (None, None); simulation.history.rate.clear(); });
+    let pairs = values::<[f64; 2]>(arrays, "bonded");
+    mutant!("checkpoint: bonded bodies are forgotten": pairs = Vec::<[f64; 2]>::new());
+    simulation.history.bonded = pairs.iter().map(|pair| pair.map(|body| body as u32)).collect();
+    let constrained = arrays["constrained"].iter().enumerate();
+    simulation.history.constrained = constrained.filter(|(_, flag)| **flag > 0.0).map(|(one, _)| one).collect();
+    let Simulation { particles, external_work, dissipated, path, .. } = simulation;
+    let fields: [(&str, &mut [f64]); 8] = [
+        ("position", bytemuck::cast_slice_mut(&mut particles.position)),
+        ("velocity", bytemuck::cast_slice_mut(&mut particles.velocity)),
+        ("acceleration", bytemuck::cast_slice_mut(&mut particles.acceleration)),
+        ("displacement_gradient", bytemuck::cast_slice_mut(&mut particles.displacement_gradient)),
+        ("memory", &mut particles.memory),
+        ("dilatation", &mut particles.dilatation),
+        ("external_work", std::slice::from_mut(external_work)),
+        ("dissipated", std::slice::from_mut(dissipated)),
+    ];
+    for (name, field) in fields {
         mutant!("checkpoint: accelerations are not restored": { if name == "acceleration" { continue; } });
-        into.copy_from_slice(values);
+        field.copy_from_slice(&arrays[name]);
+    }
+    mutant!("checkpoint: the length of the step along a path is forgotten": { return Ok(()); });
+    if let [load, increment, speed, weight] = arrays["path"][..] {
+        *path = Path { load, increment, speed, weight };
     }
     Ok(())
 }

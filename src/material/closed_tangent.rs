@@ -1,6 +1,6 @@
 //! The linearised tangent in closed form, from a handful of numbers, for isotropic laws without internal variables.
 
-use crate::scalar::{Arithmetic, Single};
+use crate::lanes::Lane;
 use crate::tensor::{Tensor, Vector, identity, outer, scaled};
 
 /// V₀ δP F_rᵀ = L B + κ (A:L) A − q A Lᵀ A + b L c, with L = Σ u ⊗ ∇_r N. B, b and c are symmetric.
@@ -9,20 +9,15 @@ use crate::tensor::{Tensor, Vector, identity, outer, scaled};
 ///
 /// ```
 /// use bfree::material::{Lame, Law, MaterialState, NeoHookean};
-/// use bfree::scalar::Single;
-/// use bfree::tensor::{Tensor, identity};
+/// use bfree::tensor::{Tensor, Vector, identity};
 ///
 /// let law = NeoHookean::ciarlet(Lame::new(1.0, 1.0)?);
 /// let at = MaterialState::new(Tensor::<f64, 2>::new(0.3, 0.1, -0.2, 0.1));
 /// let closed = law.closed(&identity(), &at, 1.0).ok_or("neo-Hooke has one")?;
 /// // Column j of the block of e_k and e_l is the product with L = e_j ⊗ e_l, applied to e_k.
-/// let (k, l, j) = (0, 1, 1);
-/// let mut unit = [[0.0; 2]; 2];
-/// unit[j][l] = 1.0;
-/// let (product, block) = (closed.product(Single, &unit), closed.unit_block(Single, k, l));
-/// for i in 0..2 {
-///     assert!((product[i][k] - block[i][j]).abs() < 1e-15);
-/// }
+/// let [e_k, e_l, e_j] = [Vector::from([1.0, 0.0]), Vector::from([0.0, 1.0]), Vector::from([0.0, 1.0])];
+/// let (product, block) = (closed.apply(&(e_j * e_l.transpose())), closed.block(&e_k, &e_l));
+/// assert!((product * e_k - block * e_j).norm() < 1e-15);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Copy, Debug)]
@@ -39,34 +34,37 @@ pub struct ClosedTangent<N, const D: usize> {
     pub both: Option<[[[N; D]; D]; 2]>,
 }
 
-impl<N: Copy, const D: usize> ClosedTangent<N, D> {
+impl<N, const D: usize> ClosedTangent<N, D> {
     /// V₀ δP F_rᵀ from L.
     #[inline(always)]
-    pub fn product<A: Arithmetic<N = N>>(&self, with: A, l: &[[N; D]; D]) -> [[N; D]; D] {
-        let (zero, a) = (with.zero(), &self.a);
+    pub(crate) fn product(&self, l: &[[N; D]; D]) -> [[N; D]; D]
+    where
+        N: Lane,
+    {
+        let (zero, a) = (self.q.constant(0.0), &self.a);
         let mut contracted = zero;
         for i in 0..D {
             for k in 0..D {
-                contracted = with.mul_add(a[i][k], l[i][k], contracted);
+                contracted = contracted.add_product(a[i][k], l[i][k]);
             }
         }
-        let bulk = with.mul(self.bulk, contracted);
+        let bulk = self.bulk * contracted;
         let mut out = [[zero; D]; D];
         for i in 0..D {
             // q A Lᵀ, row i
             let mut q_a_lt = [zero; D];
             for k in 0..D {
                 for j in 0..D {
-                    q_a_lt[k] = with.mul_add(a[i][j], l[k][j], q_a_lt[k]);
+                    q_a_lt[k] = q_a_lt[k].add_product(a[i][j], l[k][j]);
                 }
-                q_a_lt[k] = with.mul(self.q, q_a_lt[k]);
+                q_a_lt[k] = self.q * q_a_lt[k];
             }
             for k in 0..D {
-                let mut sum = with.mul(bulk, a[i][k]);
+                let mut sum = bulk * a[i][k];
                 for j in 0..D {
-                    sum = with.mul_add(l[i][j], self.right[j][k], sum);
-                    sum = with.mul_sub(q_a_lt[j], a[j][k], sum);
-                    mutant!("laws: the closed product lacks q": { sum = with.mul_add(q_a_lt[j], a[j][k], sum); });
+                    sum = sum.add_product(l[i][j], self.right[j][k]);
+                    sum = sum.sub_product(q_a_lt[j], a[j][k]);
+                    mutant!("laws: the closed product lacks q": { sum = sum.add_product(q_a_lt[j], a[j][k]); });
                 }
                 out[i][k] = sum;
             }
@@ -76,12 +74,12 @@ impl<N: Copy, const D: usize> ClosedTangent<N, D> {
                 let mut b_l = [zero; D];
                 for k in 0..D {
                     for j in 0..D {
-                        b_l[k] = with.mul_add(b[i][j], l[j][k], b_l[k]);
+                        b_l[k] = b_l[k].add_product(b[i][j], l[j][k]);
                     }
                 }
                 for k in 0..D {
                     for j in 0..D {
-                        out[i][k] = with.mul_add(b_l[j], c[j][k], out[i][k]);
+                        out[i][k] = out[i][k].add_product(b_l[j], c[j][k]);
                     }
                 }
             }
@@ -91,18 +89,21 @@ impl<N: Copy, const D: usize> ClosedTangent<N, D> {
 
     /// The block of the unit gradients e_k and e_l: κ A e_k ⊗ A e_l − q A e_l ⊗ A e_k + B_kl I + c_kl b.
     #[inline(always)]
-    pub fn unit_block<A: Arithmetic<N = N>>(&self, with: A, k: usize, l: usize) -> [[N; D]; D] {
+    pub(crate) fn unit_block(&self, k: usize, l: usize) -> [[N; D]; D]
+    where
+        N: Lane,
+    {
         let a = &self.a;
-        let mut block = [[with.zero(); D]; D];
+        let mut block = [[self.q.constant(0.0); D]; D];
         for i in 0..D {
-            let (bulk_a, q_a) = (with.mul(self.bulk, a[i][k]), with.mul(self.q, a[i][l]));
+            let (bulk_a, q_a) = (self.bulk * a[i][k], self.q * a[i][l]);
             for j in 0..D {
-                block[i][j] = with.mul_sub(q_a, a[j][k], with.mul(bulk_a, a[j][l]));
+                block[i][j] = (bulk_a * a[j][l]).sub_product(q_a, a[j][k]);
                 if let Some([b, c]) = &self.both {
-                    block[i][j] = with.mul_add(c[k][l], b[i][j], block[i][j]);
+                    block[i][j] = block[i][j].add_product(c[k][l], b[i][j]);
                 }
             }
-            block[i][i] = with.add(block[i][i], self.right[k][l]);
+            block[i][i] = block[i][i] + self.right[k][l];
         }
         block
     }
@@ -111,13 +112,7 @@ impl<N: Copy, const D: usize> ClosedTangent<N, D> {
 /// A tensor by rows.
 #[inline(always)]
 pub(super) fn rows<const D: usize>(a: &Tensor<f64, D>) -> [[f64; D]; D] {
-    let mut rows = [[0.0; D]; D];
-    for i in 0..D {
-        for k in 0..D {
-            rows[i][k] = a[(i, k)];
-        }
-    }
-    rows
+    a.transpose().data.0
 }
 
 /// A tensor from its rows.
@@ -131,7 +126,7 @@ impl<const D: usize> ClosedTangent<f64, D> {
     ///
     /// Example: [`Law::closed`](super::Law::closed).
     pub fn apply(&self, l: &Tensor<f64, D>) -> Tensor<f64, D> {
-        tensor(&self.product(Single, &rows(l)))
+        tensor(&self.product(&rows(l)))
     }
 
     /// The block of two nodes with gradients ∇_r N_I and ∇_r N_J:
@@ -141,10 +136,7 @@ impl<const D: usize> ClosedTangent<f64, D> {
         let (g_i, g_j) = (a * grad_i, a * grad_j);
         let block = scaled(&outer(&g_i, &g_j), self.bulk) - scaled(&outer(&g_j, &g_i), self.q)
             + scaled(&identity(), grad_i.dot(&(tensor(&self.right) * grad_j)));
-        match &self.both {
-            Some([b, c]) => block + scaled(&tensor(b), grad_i.dot(&(tensor(c) * grad_j))),
-            None => block,
-        }
+        self.both.map_or(block, |[b, c]| block + scaled(&tensor(&b), grad_i.dot(&(tensor(&c) * grad_j))))
     }
 
     /// The geometric part L B alone, with B = V₀ F_r S F_rᵀ, if `geometric`; otherwise the rest.

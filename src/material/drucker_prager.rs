@@ -104,6 +104,7 @@ impl DruckerPrager {
 
 impl Criterion for DruckerPrager {
     type Parameters = DruckerPragerParameters;
+    const HAS_POTENTIAL: bool = false;
     const ISOCHORIC: bool = false;
 
     fn build(given: &DruckerPragerParameters, problems: &mut Problems, path: &str) -> Option<(Lame, Self)> {
@@ -128,10 +129,6 @@ impl Criterion for DruckerPrager {
 
     fn is_associated(&self) -> bool {
         self.friction == self.dilatancy
-    }
-
-    fn has_potential(&self) -> bool {
-        false
     }
 
     fn example(solid: &Lame) -> Self {

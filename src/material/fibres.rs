@@ -130,9 +130,7 @@ impl<B: Listed> Listed for FibreReinforced<B> {
         let elastic = base.as_ref().is_none_or(|law| law.internal_variables().is_empty());
         problems.require(elastic, &at("base"), "a law with memory", "must be an elastic law");
         let direction = Vector::<f64, 3>::from(given.direction);
-        for (k, &x) in given.direction.iter().enumerate() {
-            problems.number(&format!("{}[{k}]", at("direction")), x);
-        }
+        problems.vector(&at("direction"), &given.direction, 3);
         problems.require(direction.amax() > 0.0, &at("direction"), "0", "must have a length");
         problems.positive(&at("modulus"), given.modulus);
         problems.number(&at("exponent"), given.exponent);

@@ -2,7 +2,7 @@
 
 use super::{Law, MaterialState};
 use crate::scalar::Real;
-use crate::tensor::{Tensor, embed, symmetric};
+use crate::tensor::{Tensor, Vector, embed, outer, symmetric};
 use num_dual::Dual;
 
 /// The strain energy of a new law. A user writes this one function.
@@ -40,15 +40,7 @@ pub struct FromEnergy<W>(pub W);
 
 /// The symmetric unit direction (e_i ⊗ e_k + e_k ⊗ e_i)/2.
 fn direction<T: Real>(i: usize, k: usize) -> Tensor<T, 3> {
-    let mut direction = Tensor::zeros();
-    direction[(i, k)] += T::lit(0.5);
-    direction[(k, i)] += T::lit(0.5);
-    direction
-}
-
-/// E + ε X as dual numbers.
-fn seeded<T: Real>(e: &Tensor<T, 3>, x: &Tensor<T, 3>) -> Tensor<Dual<T>, 3> {
-    e.zip_map(x, Dual::new)
+    symmetric(&outer(&Vector::ith(i, T::one()), &Vector::ith(k, T::one())))
 }
 
 impl<W: Energy> FromEnergy<W> {
@@ -57,7 +49,7 @@ impl<W: Energy> FromEnergy<W> {
         let mut stress = Tensor::zeros();
         for i in 0..D {
             for k in i..D {
-                stress[(i, k)] = self.0.energy(&seeded(e, &direction(i, k))).eps;
+                stress[(i, k)] = self.0.energy(&e.zip_map(&direction(i, k), Dual::new)).eps;
                 stress[(k, i)] = stress[(i, k)];
             }
         }
@@ -76,7 +68,7 @@ impl<W: Energy> Law for FromEnergy<W> {
 
     /// ℂ:X = dS(E + ε X)/dε
     fn elasticity<const D: usize>(&self, at: &MaterialState<f64, D>, x: &Tensor<f64, D>) -> Tensor<f64, D> {
-        let e = seeded(&embed(&at.green_lagrange()), &embed(&symmetric(x)));
+        let e = embed(&at.green_lagrange()).zip_map(&embed(&symmetric(x)), Dual::new);
         self.stress_at::<_, D>(&e).map(|s| s.eps)
     }
 }

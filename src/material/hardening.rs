@@ -100,39 +100,25 @@ impl Hardening {
         let mut good = problems.positive(&at("initial"), initial);
         for (key, value) in [("linear", linear), ("rate", rate)] {
             good &= problems.number(&at(key), value);
-            problems.require(value >= 0.0, &at(key), Number(value), "must be ≥ 0");
-            good &= value >= 0.0;
+            good &= problems.require(value >= 0.0, &at(key), Number(value), "must be ≥ 0");
         }
         good &= problems.number(&at("saturation"), saturation);
-        if !good {
+        let allowed = format_args!("must be at least -initial = {}", Number(-initial));
+        if !good || !problems.require(saturation >= -initial, &at("saturation"), Number(saturation), allowed) {
             return false;
         }
-        let least = -initial;
-        let strong = saturation >= least;
-        problems.require(
-            strong,
-            &at("saturation"),
-            Number(saturation),
-            format_args!("must be at least -initial = {}", Number(least)),
-        );
         // A rate without a saturation does nothing, nor does a saturation without a rate.
-        if strong && (rate > 0.0) != (saturation != 0.0) {
+        if (rate > 0.0) != (saturation != 0.0) {
             let allowed = if rate > 0.0 { "needs a saturation" } else { "must be > 0 with a saturation" };
             problems.refuse(&at("rate"), Number(rate), allowed);
             return false;
         }
         let softens = linear + saturation * rate;
-        let stable = softens > -stiffness;
-        problems.require(
-            stable || !strong,
-            &at("rate"),
-            Number(rate),
-            format_args!(
-                "softens faster than the solid unloads: linear + saturation rate = {} must be greater than {}",
-                Number(softens),
-                Number(-stiffness)
-            ),
+        let allowed = format_args!(
+            "softens faster than the solid unloads: linear + saturation rate = {} must be greater than {}",
+            Number(softens),
+            Number(-stiffness)
         );
-        strong && stable
+        problems.require(softens > -stiffness, &at("rate"), Number(rate), allowed)
     }
 }

@@ -173,9 +173,8 @@ impl LameParameters {
         let given: Vec<(&str, f64)> = keys.into_iter().filter_map(|(key, value)| Some((key, value?))).collect();
         let mut sensible = true;
         for (key, value) in &given {
-            let (path, modulus) = (format!("{path}.{key}"), matches!(*key, "shear" | "young" | "bulk"));
-            sensible &=
-                if modulus && *value > 0.0 { problems.positive(&path, *value) } else { problems.number(&path, *value) };
+            let (path, any_sign) = (format!("{path}.{key}"), matches!(*key, "lambda" | "poisson"));
+            sensible &= if any_sign { problems.number(&path, *value) } else { problems.positive(&path, *value) };
         }
         let lame = match (lambda, shear, young, poisson, bulk) {
             (Some(lambda), Some(shear), None, None, None) => Lame::new(lambda, shear),
@@ -189,34 +188,27 @@ impl LameParameters {
                 return None;
             }
         };
-        let positive = || "must be finite and > 0".to_owned();
-        let (key, value, allowed) = match lame {
-            _ if !sensible => return None,
-            Ok(lame) => {
+        if !sensible {
+            return None;
+        }
+        let (key, value, allowed) = match (lame, lambda, poisson) {
+            (Ok(lame), ..) => {
                 let ratio = lame.lambda / lame.shear;
                 let allowed = format_args!("the smaller modulus must not be lost in the larger one: at most {APART:e}");
-                problems.require(ratio <= APART, path, format_args!("lambda / shear = {}", Number(ratio)), allowed);
-                return (ratio <= APART).then_some(lame);
+                let found = format_args!("lambda / shear = {}", Number(ratio));
+                return problems.require(ratio <= APART, path, found, allowed).then_some(lame);
             }
-            Err(LameError::Shear(shear)) => match young {
-                Some(young) => {
-                    ("young", young, "the shear modulus young / (2 (1 + poisson)) must be finite and > 0".to_owned())
-                }
-                None => ("shear", shear, positive()),
-            },
-            Err(LameError::Bulk(bulk)) => match (lambda, shear, poisson) {
-                (Some(lambda), Some(shear), _) => {
-                    ("lambda", lambda, format!("must be greater than -2/3 shear = {}", Number(-2.0 / 3.0 * shear)))
-                }
-                (_, _, Some(poisson)) => (
-                    "poisson",
-                    poisson,
-                    "the bulk modulus young / (3 (1 - 2 poisson)) must be finite and > 0".to_owned(),
-                ),
-                _ => ("bulk", bulk, positive()),
-            },
-            Err(LameError::Young(young)) => ("young", young, positive()),
-            Err(LameError::Poisson(poisson)) => ("poisson", poisson, "must be > -1 and < 0.5".to_owned()),
+            (Err(LameError::Poisson(poisson)), ..) => ("poisson", poisson, "must be > -1 and < 0.5".to_owned()),
+            // The moduli given are positive, but not the bulk modulus that follows from them.
+            (Err(_), Some(lambda), _) => {
+                let least = Number(-2.0 / 3.0 * shear.unwrap_or(0.0));
+                ("lambda", lambda, format!("must be greater than -2/3 shear = {least}"))
+            }
+            (Err(_), None, Some(poisson)) => {
+                let allowed = "the bulk modulus young / (3 (1 - 2 poisson)) must be finite and > 0";
+                ("poisson", poisson, allowed.to_owned())
+            }
+            (Err(error), ..) => ("bulk", bulk.unwrap_or(0.0), format!("{error}, beside this shear modulus")),
         };
         problems.refuse(&format!("{path}.{key}"), Number(value), allowed);
         None

@@ -34,7 +34,7 @@ pub type TangentBlocks<const D: usize> = [[Tensor<f64, D>; D]; D];
 /// A pointwise law in `D` = 1 (uniaxial strain), 2 (plane strain) or 3 dimensions.
 ///
 /// An elastic law needs two methods, [`energy`](Self::energy) and [`stress`](Self::stress). A law with internal variables also names them
-/// ([`internal_variables`](Self::internal_variables)) and updates them ([`updated_variables`](Self::updated_variables)). All other methods
+/// ([`internal_variables`](Self::internal_variables)) and updates them ([`update_variables`](Self::update_variables)). All other methods
 /// have defaults: [`elasticity`](Self::elasticity) is the derivative of the stress by dual numbers, and the tangents follow from it. A law
 /// overrides a default where it has a closed form.
 ///
@@ -71,15 +71,16 @@ pub type TangentBlocks<const D: usize> = [[Tensor<f64, D>; D]; D];
 ///     fn stress<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> Tensor<T, D> {
 ///         at.green_lagrange() * T::lit(2.0 * self.softened(at.internal[0]))
 ///     }
-///     fn updated_variables<const D: usize>(&self, at: &MaterialState<f64, D>) -> Vec<f64> {
-///         vec![at.green_lagrange().norm().max(at.internal[0])]
+///     fn update_variables<const D: usize>(&self, at: &MaterialState<f64, D>, variables: &mut [f64]) {
+///         variables[0] = at.green_lagrange().norm().max(at.internal[0]);
 ///     }
 /// }
 ///
 /// let law = Softening { shear: 1.0 };
 /// let stretched = MaterialState::new(Tensor::<f64, 1>::from_element(1.0)); // E = 3/2
 /// let before = stretched.in_step(1.0, &[0.5]);
-/// let next = law.updated_variables(&before);
+/// let mut next = [0.5];
+/// law.update_variables(&before, &mut next);
 /// assert_eq!(next, [1.5]);
 /// assert!(law.stress(&stretched.in_step(1.0, &next))[(0, 0)] < law.stress(&before)[(0, 0)]);
 /// ```
@@ -134,12 +135,9 @@ pub trait Law: Send + Sync {
         b: &Vector<f64, D>,
     ) -> Tensor<f64, D> {
         // Column k is [ℂ:(e_k ⊗ b)] v.
-        let mut density = Tensor::<f64, D>::zeros();
-        for k in 0..D {
-            let e_k = Vector::from_fn(|i, _| f64::from(i == k));
-            density.set_column(k, &(self.elasticity(at, &outer(&e_k, b)) * v));
-        }
-        density
+        let e = |k: usize| Vector::from_fn(|i, _| f64::from(i == k));
+        let column = |k| self.elasticity(at, &outer(&e(k), b)) * v;
+        Tensor::from_columns(&std::array::from_fn::<_, D, _>(column))
     }
 
     /// The material tangent of a law without a closed form, for gradients taken in the configuration n: F ℂmat{F_rᵀe_k, F_rᵀe_l} Fᵀ in row
@@ -203,10 +201,9 @@ pub trait Law: Send + Sync {
         &[]
     }
 
-    /// The internal variables at the end of the step, in the order of [`Self::internal_variables`]. The default keeps their values at t_n.
-    fn updated_variables<const D: usize>(&self, at: &MaterialState<f64, D>) -> Vec<f64> {
-        at.internal.to_vec()
-    }
+    /// Overwrites the internal variables at t_n by those at the end of the step, in the order of [`Self::internal_variables`]. The default
+    /// keeps them.
+    fn update_variables<const D: usize>(&self, _at: &MaterialState<f64, D>, _variables: &mut [f64]) {}
 
     /// Whether ℂ has major symmetry.
     fn is_symmetric(&self) -> bool {

@@ -67,8 +67,7 @@ impl<U: Volumetric> Law for NeoHookean<U> {
     /// W = Λ/2 [½ j² + (j − ln J)] + G [(tr E − j) + (j − ln J)], or with Λ/2 (ln J)² in place of the first bracket.
     #[inline(always)]
     fn energy<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> T {
-        let half_lambda = T::lit(0.5 * self.lame.lambda);
-        half_lambda * U::energy(at) + T::lit(self.lame.shear) * at.trace_e_minus_log_jacobian()
+        U::energy(self.lame.lambda, at) + T::lit(self.lame.shear) * at.trace_e_minus_log_jacobian()
     }
 
     /// S = F⁻¹ P,  P = J U'(J) F⁻ᵀ + G (H + F⁻ᵀ Hᵀ)

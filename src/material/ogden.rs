@@ -11,7 +11,6 @@ use serde::{Deserialize, Serialize};
 
 /// A term of Ogden's energy: μ/α (λ₁^α + λ₂^α + λ₃^α − 3 − α ln J).
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
-#[schemars(rename = "OgdenTerm")]
 #[serde(deny_unknown_fields)]
 pub struct OgdenTerm {
     /// μ (stress), with the sign of α.
@@ -19,19 +18,6 @@ pub struct OgdenTerm {
     /// α (no unit), not 0 and at most 100 in size.
     #[schemars(range(min = -100, max = 100))]
     pub exponent: f64,
-}
-
-/// The constants of [`Ogden`].
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
-#[schemars(rename = "Ogden")]
-#[serde(deny_unknown_fields)]
-pub struct OgdenParameters {
-    /// The terms, 1 to 8. The shear modulus is half of the sum of `modulus` times `exponent`.
-    #[schemars(length(min = 1, max = 8))]
-    pub terms: Vec<OgdenTerm>,
-    /// The bulk modulus K (stress), > 2/3 of the shear modulus.
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub bulk: f64,
 }
 
 /// The most terms.
@@ -46,40 +32,39 @@ const MOST: usize = 8;
 /// use bfree::tensor::Tensor;
 ///
 /// // One term with α = 2 is the neo-Hookean solid of μ = G.
-/// let ogden = Ogden { terms: vec![OgdenTerm { modulus: 2.0, exponent: 2.0 }], lambda: 3.0 };
+/// let ogden = Ogden { terms: vec![OgdenTerm { modulus: 2.0, exponent: 2.0 }], bulk: 3.0 + 4.0 / 3.0 };
 /// let neo_hookean = NeoHookean::ciarlet(Lame::new(3.0, 2.0)?);
 /// let at = MaterialState::new(Tensor::<f64, 2>::new(0.3, 0.5, -0.2, 0.1));
 /// let apart = ogden.stress(&at) - neo_hookean.stress(&at);
 /// assert!(apart.norm() < 1e-14);
 /// # Ok::<(), bfree::material::LameError>(())
 /// ```
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[schemars(description = "The constants of [`Ogden`].")]
+#[serde(deny_unknown_fields)]
 pub struct Ogden {
-    /// The terms.
+    /// The terms, 1 to 8. The shear modulus is half of the sum of `modulus` times `exponent`.
+    #[schemars(length(min = 1, max = 8))]
     pub terms: Vec<OgdenTerm>,
-    /// Λ
-    pub lambda: f64,
+    /// The bulk modulus K (stress), > 2/3 of the shear modulus.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub bulk: f64,
 }
 
 impl Law for Ogden {
     /// Σ μα tr R(ε) + U, with R(x) = (e^{αx} − 1 − αx)/α² and tr ε = ln J
     fn energy<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> T {
         let strain = Strained::new(at, &[]).strain();
-        let terms = self
-            .terms
-            .iter()
-            .map(|term| primitive_trace(&Power(term.exponent), &strain) * T::lit(term.modulus * term.exponent));
-        terms.fold(Ciarlet::energy(at) * T::lit(0.5 * self.lambda), |sum, term| sum + term)
+        let of = |(power, factor): (Power, f64)| primitive_trace(&power, &strain) * T::lit(factor);
+        let volumetric = Ciarlet::energy(self.lambda(), at);
+        self.powers().map(of).fold(volumetric, |sum, term| sum + term)
     }
 
     fn stress<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> Tensor<T, D> {
         let strained = Strained::new(at, &[]);
-        let terms = self
-            .terms
-            .iter()
-            .map(|term| scaled(&strained.function(&Power(term.exponent)), T::lit(term.modulus * term.exponent)));
-        let pressure = scaled(&identity(), Ciarlet::stress(self.lambda, at));
-        strained.pulled_back(&terms.fold(pressure, |sum: Tensor<T, 3>, term| sum + term))
+        let of = |(power, factor): (Power, f64)| scaled(&strained.function(&power), T::lit(factor));
+        let pressure: Tensor<T, 3> = scaled(&identity(), Ciarlet::stress(self.lambda(), at));
+        strained.pulled_back(&self.powers().map(of).fold(pressure, |sum, term| sum + term))
     }
 
     fn elasticity<const D: usize>(&self, at: &MaterialState<f64, D>, x: &Tensor<f64, D>) -> Tensor<f64, D> {
@@ -87,7 +72,7 @@ impl Law for Ogden {
     }
 
     fn volumetric<T: Real>(&self, at: &Deformation<T, 1>) -> Option<VolumeResponse<T>> {
-        Some(Ciarlet::response(self.lambda, at))
+        Some(Ciarlet::response(self.lambda(), at))
     }
 
     fn tangent_blocks<const D: usize>(&self, f_r: &Tensor<f64, D>, at: &MaterialState<f64, D>) -> TangentBlocks<D> {
@@ -98,56 +83,60 @@ impl Law for Ogden {
 }
 
 impl Ogden {
+    /// Λ
+    fn lambda(&self) -> f64 {
+        self.bulk - self.least_bulk()
+    }
+
+    /// 2G/3 with 2G = Σ μα
+    fn least_bulk(&self) -> f64 {
+        let shear = 0.5 * self.terms.iter().map(|term| term.modulus * term.exponent).sum::<f64>();
+        2.0 * shear / 3.0
+    }
+
+    /// (e^{αε} − I)/α and the factor μα of each term.
+    fn powers(&self) -> impl Iterator<Item = (Power, f64)> {
+        self.terms.iter().map(|term| (Power(term.exponent), term.modulus * term.exponent))
+    }
+
     /// τᵢ = Σ μ (e^{αεᵢ} − 1) + J U' and its derivatives.
     fn moduli<const D: usize>(&self, at: &Deformation<f64, D>) -> Moduli {
         let principal = Principal::new(at, &[]);
-        let (strains, pressure) = (principal.strains, Ciarlet::stress(self.lambda, at));
+        let (strains, pressure) = (principal.strains, Ciarlet::stress(self.lambda(), at));
         let sum = |of: &dyn Fn(&Power) -> f64| {
-            let terms = self.terms.iter();
-            let terms = terms.map(|term| of(&Power(term.exponent)) * (term.modulus * term.exponent));
-            terms.fold(0.0, |sum, term| sum + term)
+            self.powers().map(|(power, factor)| of(&power) * factor).fold(0.0, |sum, term| sum + term)
         };
         let secant = |i: usize, j: usize| sum(&|f| f.difference(strains[i], strains[j]));
-        let bulk = Ciarlet::stiffness(self.lambda, at);
+        let bulk = Ciarlet::stiffness(self.lambda(), at);
         let slopes = Tensor::from_fn(|i, j| if i == j { bulk + secant(i, i) } else { bulk });
         principal.moduli(std::array::from_fn(|i| pressure + sum(&|f| f.value(strains[i]))), slopes, secant)
     }
 }
 
 impl Listed for Ogden {
-    type Parameters = OgdenParameters;
+    type Parameters = Self;
 
-    fn build(given: &OgdenParameters, problems: &mut Problems, path: &str) -> Option<Self> {
+    fn build(given: &Self, problems: &mut Problems, path: &str) -> Option<Self> {
         let (terms, count) = (format!("{path}.terms"), given.terms.len());
-        let few = (1..=MOST).contains(&count);
-        problems.require(few, &terms, format_args!("a list of {count}"), format_args!("must have 1 to {MOST} entries"));
-        let mut good = few;
+        let few = format_args!("must have 1 to {MOST} entries");
+        let mut good = problems.require((1..=MOST).contains(&count), &terms, format_args!("a list of {count}"), few);
         for (i, OgdenTerm { modulus, exponent }) in given.terms.iter().enumerate().take(MOST) {
             let (of_modulus, of_exponent) = (format!("{terms}[{i}].modulus"), format!("{terms}[{i}].exponent"));
             good &= problems.number(&of_modulus, *modulus) && problems.between(&of_exponent, *exponent, -100.0, 100.0);
-            let stiff = modulus * exponent > 0.0;
-            problems.require(
-                stiff,
-                &of_modulus,
-                Number(*modulus),
-                "must have the sign of the exponent, and neither may be 0",
-            );
-            good &= stiff;
+            let allowed = "must have the sign of the exponent, and neither may be 0";
+            good &= problems.require(modulus * exponent > 0.0, &of_modulus, Number(*modulus), allowed);
         }
-        good &= problems.positive(&format!("{path}.bulk"), given.bulk);
-        if !good {
-            return None;
-        }
-        let shear = 0.5 * given.terms.iter().map(|term| term.modulus * term.exponent).sum::<f64>();
-        let least = 2.0 * shear / 3.0;
+        let bulk = format!("{path}.bulk");
+        good &= problems.positive(&bulk, given.bulk);
+        let least = given.least_bulk();
         let allowed = format_args!("must be greater than 2/3 of the shear modulus = {}", Number(least));
-        problems.require(given.bulk > least, &format!("{path}.bulk"), Number(given.bulk), allowed);
-        (given.bulk > least).then(|| Self { terms: given.terms.clone(), lambda: given.bulk - least })
+        let stiff = good && problems.require(given.bulk > least, &bulk, Number(given.bulk), allowed);
+        stiff.then(|| given.clone())
     }
 
     /// Ogden's rubber, roughly: stretches to the powers 1.5 and −2.
     fn example(lame: Lame) -> Self {
         let (shear, term) = (lame.shear, |modulus, exponent| OgdenTerm { modulus, exponent });
-        Self { terms: vec![term(shear, 1.5), term(-0.25 * shear, -2.0)], lambda: lame.lambda }
+        Self { terms: vec![term(shear, 1.5), term(-0.25 * shear, -2.0)], bulk: lame.bulk_modulus() }
     }
 }

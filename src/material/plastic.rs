@@ -22,7 +22,7 @@ pub trait Criterion: Clone + Send + Sync + Sized + 'static {
 
     /// Whether the dissipation of a step is a potential of the plastic flow. The flow must be associated, and the hardening work integrated
     /// along the step, not taken at its end.
-    fn has_potential(&self) -> bool;
+    const HAS_POTENTIAL: bool;
 
     /// Whether plastic flow keeps the volume, so that tr ε = ln J, and neither the deviatoric stress nor the flow depends on the pressure.
     const ISOCHORIC: bool;
@@ -133,7 +133,7 @@ impl<Y: Criterion> Law for Plastic<Y> {
     }
 
     fn has_potential(&self) -> bool {
-        self.criterion.has_potential()
+        Y::HAS_POTENTIAL
     }
 
     /// W of the elastic strain plus the dissipation of the step. For associated flow the sum is stationary with respect to the flow.
@@ -165,22 +165,20 @@ impl<Y: Criterion> Law for Plastic<Y> {
         Y::ISOCHORIC.then(|| Logarithmic::response(self.solid.bulk_modulus(), at))
     }
 
-    fn updated_variables<const D: usize>(&self, at: &MaterialState<f64, D>) -> Vec<f64> {
+    fn update_variables<const D: usize>(&self, at: &MaterialState<f64, D>, variables: &mut [f64]) {
         let (principal, ReturnMapped { radial, plastic_strain, dissipated }) = self.principal(at);
         let (before, inverse_inelastic) = at_start(at);
-        let mut next = at.internal.to_vec();
-        if let [strain, lost, plastic @ ..] = next.as_mut_slice()
-            && plastic_strain != before
-        {
-            *strain = plastic_strain;
-            *lost += dissipated;
-            // Δε = ε_trial − ε
-            let volume = (principal.volume() - radial.p / self.solid.bulk_modulus()) / 3.0;
-            mutant!("laws: the plastic change of volume is forgotten": volume = 0.0);
-            let share = 1.0 - radial.g / (2.0 * self.solid.shear);
-            principal.flow(principal.deviator().map(|x| share * x + volume), inverse_inelastic, plastic);
+        let [strain, lost, plastic @ ..] = variables else { return };
+        if plastic_strain == before {
+            return;
         }
-        next
+        *strain = plastic_strain;
+        *lost += dissipated;
+        // Δε = ε_trial − ε
+        let volume = (principal.volume() - radial.p / self.solid.bulk_modulus()) / 3.0;
+        mutant!("laws: the plastic change of volume is forgotten": volume = 0.0);
+        let share = 1.0 - radial.g / (2.0 * self.solid.shear);
+        principal.flow(principal.deviator().map(|x| share * x + volume), inverse_inelastic, plastic);
     }
 }
 

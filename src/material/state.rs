@@ -71,7 +71,7 @@ impl<'a, T: Real, const D: usize> MaterialState<'a, T, D> {
     #[inline(always)]
     pub(crate) fn admissible_or_rest(self) -> (Self, f64) {
         let det_f = self.jacobian.value();
-        (if possible(det_f) { self } else { self.deformed(Tensor::zeros()) }, det_f)
+        (if NonPositiveJacobian::check(det_f).is_ok() { self } else { self.deformed(Tensor::zeros()) }, det_f)
     }
 }
 
@@ -92,12 +92,6 @@ pub struct NonPositiveJacobian {
     pub det_f: f64,
 }
 
-/// Whether det F is positive and finite.
-#[inline(always)]
-fn possible(det_f: f64) -> bool {
-    det_f > 0.0 && det_f.is_finite()
-}
-
 impl NonPositiveJacobian {
     /// Checks det F > 0; refuses NaN and infinity.
     ///
@@ -114,6 +108,6 @@ impl NonPositiveJacobian {
     /// `det_f` is not positive, or not finite.
     #[inline(always)]
     pub fn check(det_f: f64) -> Result<(), Self> {
-        if possible(det_f) { Ok(()) } else { Err(Self { det_f }) }
+        if det_f > 0.0 && det_f.is_finite() { Ok(()) } else { Err(Self { det_f }) }
     }
 }

@@ -73,8 +73,8 @@ macro_rules! law_of_variants {
         fn internal_variables(&self) -> &[$crate::material::InternalVariable] {
             match self { $(Self::$variant(law) => $crate::material::Law::internal_variables(law)),+ }
         }
-        fn updated_variables<const D: usize>(&self, at: &$crate::material::MaterialState<f64, D>) -> Vec<f64> {
-            match self { $(Self::$variant(law) => $crate::material::Law::updated_variables(law, at)),+ }
+        fn update_variables<const D: usize>(&self, at: &$crate::material::MaterialState<f64, D>, variables: &mut [f64]) {
+            match self { $(Self::$variant(law) => $crate::material::Law::update_variables(law, at, variables)),+ }
         }
         fn is_symmetric(&self) -> bool {
             match self { $(Self::$variant(law) => $crate::material::Law::is_symmetric(law)),+ }

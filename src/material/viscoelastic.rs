@@ -50,7 +50,7 @@ pub struct ViscoelasticParameters<P> {
 /// let sheared = MaterialState::new(Tensor::<f64, 2>::new(0.0, 1e-6, 0.0, 0.0));
 /// let mut internal = vec![0.0; law.internal_variables().len()];
 /// for dt in [0.5, 1.5] {
-///     internal = law.updated_variables(&sheared.in_step(dt, &internal));
+///     law.update_variables(&sheared.in_step(dt, &internal.clone()), &mut internal);
 /// }
 /// let modulus = law.stress(&sheared.in_step(0.0, &internal))[(0, 1)] / 1e-6;
 /// assert!((modulus - (1.0 + 3.0 * (-1.0_f64).exp())).abs() < 1e-9);
@@ -98,9 +98,9 @@ impl<B: Law> Viscoelastic<B> {
     ) -> impl Iterator<Item = (&'a Branch, &'a [f64], f64)> {
         let (dt, internal) = (at.dt, at.internal);
         self.branches.iter().enumerate().map(move |(i, branch)| {
-            let first = 1 + SIX * i;
-            mutant!("laws: Euler's step for the relaxation": { return (branch, internal.get(first..first + SIX).unwrap_or(&[]), 1.0 / (1.0 + dt / branch.relaxation_time)); });
-            (branch, internal.get(first..first + SIX).unwrap_or(&[]), (-dt / branch.relaxation_time).exp())
+            let decay = (-dt / branch.relaxation_time).exp();
+            mutant!("laws: Euler's step for the relaxation": decay = 1.0 / (1.0 + dt / branch.relaxation_time));
+            (branch, internal.get(1 + SIX * i..).and_then(|rest| rest.get(..SIX)).unwrap_or(&[]), decay)
         })
     }
 }
@@ -124,18 +124,20 @@ impl<B: Law> Law for Viscoelastic<B> {
     }
 
     fn stress<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> Tensor<T, D> {
-        let springs = self.branches(at).map(|(branch, inverse_inelastic, decay)| {
+        let mut stress = self.base.stress(at);
+        for (branch, inverse_inelastic, decay) in self.branches(at) {
             let radial = relaxed(branch, decay);
-            Strained::new(at, inverse_inelastic).stress(radial.p, radial.g)
-        });
-        springs.fold(self.base.stress(at), |sum, stress: Tensor<T, D>| sum + stress)
+            stress += Strained::new(at, inverse_inelastic).stress(radial.p, radial.g);
+        }
+        stress
     }
 
     fn elasticity<const D: usize>(&self, at: &MaterialState<f64, D>, x: &Tensor<f64, D>) -> Tensor<f64, D> {
-        let springs = self.branches(at).map(|(branch, inverse_inelastic, decay)| {
-            Principal::new(at, inverse_inelastic).radial_moduli(&relaxed(branch, decay)).elasticity(x)
-        });
-        springs.fold(self.base.elasticity(at, x), |sum, stress: Tensor<f64, D>| sum + stress)
+        let mut stress = self.base.elasticity(at, x);
+        for (branch, inverse_inelastic, decay) in self.branches(at) {
+            stress += Principal::new(at, inverse_inelastic).radial_moduli(&relaxed(branch, decay)).elasticity(x);
+        }
+        stress
     }
 
     /// The response of the base, because branches have neither springs nor viscosity in volume.
@@ -152,16 +154,13 @@ impl<B: Law> Law for Viscoelastic<B> {
     }
 
     /// The branches dissipate G (1 − e^{−2Δt/τ_r}) dev ε_trial : dev ε_trial.
-    fn updated_variables<const D: usize>(&self, at: &MaterialState<f64, D>) -> Vec<f64> {
-        let mut next = at.internal.to_vec();
-        if let [dissipated, viscous @ ..] = next.as_mut_slice() {
-            for ((branch, inverse_inelastic, decay), viscous) in self.branches(at).zip(viscous.chunks_mut(SIX)) {
-                let principal = Principal::new(at, inverse_inelastic);
-                *dissipated += branch.shear * (1.0 - decay * decay) * principal.norm().powi(2);
-                principal.flow(principal.deviator().map(|x| x * (1.0 - decay)), inverse_inelastic, viscous);
-            }
+    fn update_variables<const D: usize>(&self, at: &MaterialState<f64, D>, variables: &mut [f64]) {
+        let [dissipated, viscous @ ..] = variables else { return };
+        for ((branch, inverse_inelastic, decay), viscous) in self.branches(at).zip(viscous.chunks_mut(SIX)) {
+            let principal = Principal::new(at, inverse_inelastic);
+            *dissipated += branch.shear * (1.0 - decay * decay) * principal.norm().powi(2);
+            principal.flow(principal.deviator().map(|x| x * (1.0 - decay)), inverse_inelastic, viscous);
         }
-        next
     }
 }
 
@@ -174,19 +173,13 @@ impl<B: Listed> Listed for Viscoelastic<B> {
         let elastic = law.as_ref().is_none_or(|law| law.internal_variables().is_empty());
         problems.require(elastic, &base, "a law with memory", "must be an elastic law");
         let count = given.branches.len();
-        let few = (1..=MOST).contains(&count);
-        problems.require(
-            few,
-            &branches,
-            format_args!("a list of {count}"),
-            format_args!("must have 1 to {MOST} entries"),
-        );
-        let mut good = true;
+        let few = format_args!("must have 1 to {MOST} entries");
+        let mut good = problems.require((1..=MOST).contains(&count), &branches, format_args!("a list of {count}"), few);
         for (i, branch) in given.branches.iter().enumerate().take(MOST) {
             good &= problems.positive(&format!("{branches}[{i}].shear"), branch.shear);
             good &= problems.positive(&format!("{branches}[{i}].relaxation_time"), branch.relaxation_time);
         }
-        law.filter(|_| good && few).and_then(|law| Self::new(law, given.branches.clone()))
+        law.filter(|_| good).and_then(|law| Self::new(law, given.branches.clone()))
     }
 
     /// Half of G relaxes.

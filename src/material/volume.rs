@@ -14,10 +14,10 @@ pub struct VolumeResponse<T> {
     pub stiffness: T,
 }
 
-/// The volumetric energy U(J) of a solid, over Λ. It is a type, so that a loop over particles does not branch on it.
+/// The volumetric energy U(J) of a solid, for a given Λ. It is a type, so that a loop over particles does not branch on it.
 pub trait Volumetric: Copy + Default + Send + Sync + 'static {
-    /// 2 U/Λ.
-    fn energy<T: Real, const D: usize>(at: &Deformation<T, D>) -> T;
+    /// U for Λ = `lambda`.
+    fn energy<T: Real, const D: usize>(lambda: f64, at: &Deformation<T, D>) -> T;
 
     /// J U'(J) for Λ = `lambda`.
     fn stress<T: Real, const D: usize>(lambda: f64, at: &Deformation<T, D>) -> T;
@@ -28,7 +28,7 @@ pub trait Volumetric: Copy + Default + Send + Sync + 'static {
     /// U and its derivatives for Λ = `lambda`.
     fn response<T: Real>(lambda: f64, at: &Deformation<T, 1>) -> VolumeResponse<T> {
         VolumeResponse {
-            energy: Self::energy(at) * T::lit(0.5 * lambda),
+            energy: Self::energy(lambda, at),
             stress: Self::stress(lambda, at),
             stiffness: Self::stiffness(lambda, at),
         }
@@ -40,10 +40,10 @@ pub trait Volumetric: Copy + Default + Send + Sync + 'static {
 pub struct Ciarlet;
 
 impl Volumetric for Ciarlet {
-    /// ½ j² + (j − ln J)
+    /// Λ/2 [½ j² + (j − ln J)]
     #[inline(always)]
-    fn energy<T: Real, const D: usize>(at: &Deformation<T, D>) -> T {
-        T::lit(0.5) * at.j * at.j + at.j_minus_log_jacobian()
+    fn energy<T: Real, const D: usize>(lambda: f64, at: &Deformation<T, D>) -> T {
+        T::lit(0.5 * lambda) * (T::lit(0.5) * at.j * at.j + at.j_minus_log_jacobian())
     }
 
     /// Λ/2 (J²−1)
@@ -65,10 +65,10 @@ impl Volumetric for Ciarlet {
 pub struct Logarithmic;
 
 impl Volumetric for Logarithmic {
-    /// (ln J)²
+    /// Λ/2 (ln J)²
     #[inline(always)]
-    fn energy<T: Real, const D: usize>(at: &Deformation<T, D>) -> T {
-        at.log_jacobian() * at.log_jacobian()
+    fn energy<T: Real, const D: usize>(lambda: f64, at: &Deformation<T, D>) -> T {
+        T::lit(0.5 * lambda) * (at.log_jacobian() * at.log_jacobian())
     }
 
     /// Λ ln J

@@ -30,6 +30,7 @@ pub struct VonMisesParameters {
 
 impl Criterion for VonMises {
     type Parameters = VonMisesParameters;
+    const HAS_POTENTIAL: bool = true;
     const ISOCHORIC: bool = true;
 
     fn build(given: &VonMisesParameters, problems: &mut Problems, path: &str) -> Option<(Lame, Self)> {
@@ -40,10 +41,6 @@ impl Criterion for VonMises {
     }
 
     fn is_associated(&self) -> bool {
-        true
-    }
-
-    fn has_potential(&self) -> bool {
         true
     }
 

@@ -110,9 +110,8 @@ impl<const D: usize> Tangent<'_, D> {
         for (outer, _, row) in self.unknowns.followers.rows() {
             leaders[outer] = row.map(|(leader, _)| leader).collect();
         }
-        let (prescribed, follows) =
-            (self.unknowns.prescribed_mask(self.supports.nodes()), self.unknowns.following_mask(self.supports.nodes()));
-        let fixed = prescribed.iter().zip(&follows).map(|(prescribed, follows)| *prescribed || *follows).collect();
+        let mut fixed = self.unknowns.following_mask(self.supports.nodes());
+        self.unknowns.prescribed.iter().for_each(|dof| fixed[dof.node * D + dof.component] = true);
         Neighbours { nodes: self.indices(), reach, leaders, fixed }
     }
 

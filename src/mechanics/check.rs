@@ -5,7 +5,7 @@ use crate::material::{Law, MaterialState};
 use crate::mechanics::constitutive::{Part, compose};
 use crate::mechanics::residual::{Equilibrium, Inadmissible};
 use crate::mechanics::tangent::Tangent;
-use crate::mechanics::terms::Piece;
+use crate::mechanics::terms::{Piece, Role};
 use crate::tensor::{Tensor, Vector, identity, inverse};
 
 /// The largest accepted relative difference: min(64 eps κ(F)², 1e-10), with κ(F) = ‖F‖ ‖F⁻¹‖.
@@ -53,16 +53,10 @@ pub struct TangentMismatch {
 pub enum CheckError {
     /// The tangent is wrong.
     #[error(transparent)]
-    Mismatch(Box<TangentMismatch>),
+    Mismatch(#[from] TangentMismatch),
     /// The state cannot be evaluated.
     #[error(transparent)]
     Inadmissible(#[from] Inadmissible),
-}
-
-impl From<TangentMismatch> for CheckError {
-    fn from(mismatch: TangentMismatch) -> Self {
-        Self::Mismatch(Box::new(mismatch))
-    }
 }
 
 /// A quasi-random direction with entries in (−1, 1): the golden-ratio sequence, from a start that depends on `seed`.
@@ -111,7 +105,7 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     /// The first mismatch, or a particle with det F ≤ 0.
     pub fn check_tangent(&self, dphi: &[Vector<f64, D>], u: &[Vector<f64, D>]) -> Result<(), CheckError> {
         let mut u = u.to_vec();
-        self.clear_prescribed(&mut u);
+        self.unknowns.clear_prescribed(&mut u);
         let dphi = &*self.unknowns.extended(dphi);
         let bound = self.worst_bound(dphi)?;
         let product = |tangent: &Tangent<'_, D>| {
@@ -122,7 +116,7 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
         let (mut whole, mut of_term) = (vec![Vector::zeros(); u.len()], 0.0);
         for piece in self.terms.pieces() {
             let mut dual = self.derivative(piece, dphi, &u)?;
-            self.clear_prescribed(&mut dual);
+            self.unknowns.clear_prescribed(&mut dual);
             let analytic = product(&self.tangent_of(piece, dphi)?);
             // The contributions of a piece may cancel, like those of pressure in 1D. Their size is then the scale of round-off.
             let mut scale = norm(&dual).max(self.size_of(piece, dphi, &u)?);
@@ -156,7 +150,8 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     /// The size of a piece's contributions to K u where they may cancel: for loads, the force times |u|/h.
     fn size_of(&self, piece: Piece, dphi: &[Vector<f64, D>], u: &[Vector<f64, D>]) -> Result<f64, Inadmissible> {
         let nodes = self.step.supports.of(0).map(|(_, _, grad_n)| grad_n.norm()).fold(0.0, f64::max);
-        Ok(if self.terms.is_load(piece) { norm(&self.residual_of::<f64>(piece, dphi)?) * norm(u) * nodes } else { 0.0 })
+        let is_load = piece.role == Role::Loads;
+        Ok(if is_load { norm(&self.residual_of::<f64>(piece, dphi)?) * norm(u) * nodes } else { 0.0 })
     }
 
     /// Compares the diagonal blocks of a few nodes with the products of unit vectors at these nodes.
@@ -181,7 +176,7 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
                 let apart = |k: usize| k != i && uncoupled.contains(&node);
                 (0..D).filter(|&k| held(node, k) || apart(k)).for_each(|k| (column[k], out[node][k]) = (0.0, 0.0));
                 let found = compare("diagonal blocks", &[column], &[out[node]], bound, scale);
-                found.map_err(|error| CheckError::Mismatch(Box::new(TangentMismatch { node, ..error })))?;
+                found.map_err(|error| TangentMismatch { node, ..error })?;
             }
         }
         Ok(())

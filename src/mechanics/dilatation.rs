@@ -4,7 +4,6 @@
 //! A particle stores θ_n, the product of the Θ of all earlier grids. Its stress depends on θ = Θ θ_n, so that stresses are continuous at a
 //! grid reset. Between two resets θ_n and H keep their values of the last reset.
 
-use crate::grid::{Grid, indices};
 use crate::lanes::LANES;
 use crate::material::Law;
 use crate::mechanics::sweep::{Number, Supports};
@@ -84,7 +83,8 @@ impl Cells {
         }
         for p in (0..particles.len()).filter(|&p| !particles.is_solid(p) && averages[particles.body[p] as usize]) {
             let (x, body) = (&reference.position[p], particles.body[p]);
-            let near = neighbours(grid, x).filter_map(|cell| {
+            let around = grid.cell(x).into_iter().flat_map(|cell| grid.around(cell, 1));
+            let near = around.filter_map(|cell| {
                 let number = keys.binary_search(&(grid.id(cell), body)).ok()?;
                 let middle = grid.position(cell) + Vector::repeat(0.5 * grid.spacing);
                 Some((number, (x - middle).norm_squared()))
@@ -128,17 +128,6 @@ impl Cells {
         };
         self.iter().map(mean).collect()
     }
-}
-
-/// The cell of a point and the cells around that cell.
-fn neighbours<const D: usize>(grid: &Grid<D>, x: &Vector<f64, D>) -> impl Iterator<Item = [u32; D]> {
-    grid.cell(x).into_iter().flat_map(move |at| {
-        indices([3; D]).filter_map(move |step| {
-            let cell: [Option<u32>; D] =
-                std::array::from_fn(|k| (at[k] + step[k] as u32).checked_sub(1).filter(|&i| i < grid.cells[k]));
-            cell.iter().all(Option::is_some).then(|| cell.map(Option::unwrap_or_default))
-        })
-    })
 }
 
 /// θ − 1 of θ = Θ θ_n, from Θ − 1 and θ_n − 1.

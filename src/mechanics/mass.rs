@@ -27,9 +27,6 @@ pub struct Mass<'a, const D: usize> {
     pub lumping: f64,
 }
 
-/// K nodal fields.
-pub(crate) type Projected<const K: usize, const D: usize> = [Pooled<Vector<f64, D>>; K];
-
 /// Σ_p m N_I at every active node.
 pub fn lumped<const D: usize>(particles: &Particles<D>, supports: &Supports<D>) -> Pooled<f64> {
     let mut mass = supports.field();
@@ -45,10 +42,10 @@ pub(super) fn is_light<const D: usize>(particles: &Particles<D>) -> impl Fn(f64)
 }
 
 impl<const D: usize> Mass<'_, D> {
-    /// (1−ε) m of a particle; `None` if the mass is lumped.
+    /// (1−ε) m of a particle.
     #[inline(always)]
-    pub fn consistent(&self, p: usize) -> Option<f64> {
-        (self.lumping < 1.0).then(|| (1.0 - self.lumping) * self.particles.mass[p])
+    pub(crate) fn consistent(&self, p: usize) -> f64 {
+        (1.0 - self.lumping) * self.particles.mass[p]
     }
 
     /// `out += factor M̃ u`
@@ -65,15 +62,15 @@ impl<const D: usize> Mass<'_, D> {
         }
     }
 
-    /// Solves M̃ w = Σ_p m u_p N_I for every particle field `u`; at light nodes w = 0. Also returns the number of iterations, 0 for a
-    /// lumped mass.
+    /// Solves M̃ w = Σ_p m u_p N_I for two particle fields `u`; at light nodes w = 0. Also returns the number of iterations, 0 for a lumped
+    /// mass.
     ///
     /// # Errors
     /// The sums overflow.
-    pub fn project<const K: usize>(
+    pub(crate) fn project(
         &self,
-        fields: [&[Vector<f64, D>]; K],
-    ) -> Result<(Projected<K, D>, usize), LinearError> {
+        fields: [&[Vector<f64, D>]; 2],
+    ) -> Result<([Pooled<Vector<f64, D>>; 2], usize), LinearError> {
         let followers = followers(self.supports);
         let lumped = restricted(&followers, self.lumped);
         let right = |field: &[Vector<f64, D>]| {

@@ -86,17 +86,21 @@ impl<'a, const D: usize, L: Law> OnPath<'a, D, L> {
         Ok(Self { path, start, force, at_start: force(path.load)?, before, direction, length: path.speed * dt })
     }
 
+    /// φ − φ_n, and d, at the nodes.
+    fn moved<'b>(&'b self, phi: &'b [Vector<f64, D>]) -> impl Iterator<Item = (Vector<f64, D>, &'b Vector<f64, D>)> {
+        phi.iter().zip(&self.before).map(|(phi, before)| phi - before).zip(&self.direction)
+    }
+
     /// λ(φ) = λ_n + (Δs − d·(φ − φ_n))/w
     pub fn load(&self, phi: &[Vector<f64, D>]) -> f64 {
-        let moved = phi.iter().zip(&self.before).zip(&self.direction).map(|((phi, before), d)| d.dot(&(phi - before)));
-        self.path.load + (self.length - moved.sum::<f64>()) / self.path.weight
+        let along: f64 = self.moved(phi).map(|(moved, d)| d.dot(&moved)).sum();
+        self.path.load + (self.length - along) / self.path.weight
     }
 
     /// The cosine of the angle between φ − φ_n and d; 1 where nothing moves.
     pub fn straight(&self, phi: &[Vector<f64, D>]) -> f64 {
         let (mut along, mut squares) = (0.0, 0.0);
-        for ((phi, before), d) in phi.iter().zip(&self.before).zip(&self.direction) {
-            let moved = phi - before;
+        for (moved, d) in self.moved(phi) {
             along += d.dot(&moved);
             squares += moved.norm_squared();
         }

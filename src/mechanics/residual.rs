@@ -156,7 +156,7 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
     /// The external nodal forces at Δφ, zero at prescribed degrees of freedom.
     pub(crate) fn free_external_force(&self, dphi: &[Vector<f64, D>]) -> Result<Pooled<Vector<f64, D>>, Inadmissible> {
         let mut force = self.external_force(dphi)?;
-        self.clear_prescribed(&mut force);
+        self.unknowns.clear_prescribed(&mut force);
         Ok(force)
     }
 
@@ -188,7 +188,7 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
     }
 
     fn free_norm(&self, mut field: Pooled<Vector<f64, D>>) -> f64 {
-        self.clear_prescribed(&mut field);
+        self.unknowns.clear_prescribed(&mut field);
         vector::norm(bytemuck::cast_slice(&field))
     }
 

@@ -4,9 +4,12 @@
 use crate::grid::Grid;
 use crate::material::Law;
 use crate::mechanics::residual::Equilibrium;
+use crate::mechanics::sweep::Supports;
+use crate::mechanics::terms::Step;
 use crate::nodes::Nodes;
 use crate::tensor::Vector;
 use nalgebra::{DMatrix, DVector};
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::{Display, Formatter};
 
 /// Relative tolerance. A mode is free if the prescribed degrees of freedom see less than this part of it. A mode is loaded if more than
@@ -59,22 +62,19 @@ pub fn loose<const D: usize, L: Law>(
     equilibrium: &Equilibrium<'_, D, L>,
     nodes: &Nodes,
 ) -> Option<Loose> {
+    let Step { supports, particles, bodies, .. } = equilibrium.step;
     let positions: Vec<Vector<f64, D>> = nodes.positions(grid).map(|(_, x)| x).collect();
-    let group = groups(equilibrium, positions.len());
+    let group = groups(supports, positions.len());
     let force = equilibrium.external_force(&vec![Vector::zeros(); positions.len()]).ok()?;
-    let mut of_group = vec![Vec::new(); positions.len()];
-    group.iter().enumerate().for_each(|(node, &root)| of_group[root].push(node));
-    for (root, members) in of_group.iter().enumerate().filter(|(_, members)| !members.is_empty()) {
+    let mut of_group: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    group.iter().enumerate().for_each(|(node, &root)| of_group.entry(root).or_default().push(node));
+    for (root, members) in of_group {
         let held = equilibrium.prescribed.iter().filter(|dof| group[dof.node] == root);
         let held = held.map(|dof| (dof.node, dof.component));
-        if let Some(axis) = pushed(&positions, members, held, &force) {
-            let mut bodies: Vec<u32> = (0..equilibrium.step.supports.particles())
-                .filter(|&p| equilibrium.step.supports.of(p).next().is_some_and(|(node, ..)| group[node] == root))
-                .map(|p| equilibrium.step.particles.body[p])
-                .collect();
-            bodies.sort_unstable();
-            bodies.dedup();
-            let bodies = bodies.into_iter().map(|body| equilibrium.step.bodies[body as usize].name.clone()).collect();
+        if let Some(axis) = pushed(&positions, &members, held, &force) {
+            let of_root = |&p: &usize| supports.of(p).next().is_some_and(|(node, ..)| group[node] == root);
+            let found: BTreeSet<u32> = (0..supports.particles()).filter(of_root).map(|p| particles.body[p]).collect();
+            let bodies = found.into_iter().map(|body| bodies[body as usize].name.clone()).collect();
             return Some(Loose { bodies, axis });
         }
     }
@@ -82,7 +82,7 @@ pub fn loose<const D: usize, L: Law>(
 }
 
 /// For each node, the smallest node that particles connect it with.
-fn groups<const D: usize, L: Law>(equilibrium: &Equilibrium<'_, D, L>, count: usize) -> Vec<usize> {
+fn groups<const D: usize>(supports: &Supports<D>, count: usize) -> Vec<usize> {
     fn root(parent: &mut [usize], mut node: usize) -> usize {
         while parent[node] != node {
             parent[node] = parent[parent[node]];
@@ -91,9 +91,9 @@ fn groups<const D: usize, L: Law>(equilibrium: &Equilibrium<'_, D, L>, count: us
         node
     }
     let mut parent: Vec<usize> = (0..count).collect();
-    for p in 0..equilibrium.step.supports.particles() {
+    for p in 0..supports.particles() {
         let mut last = None;
-        for (node, ..) in equilibrium.step.supports.of(p) {
+        for (node, ..) in supports.of(p) {
             let one = root(&mut parent, node);
             let other = last.map_or(one, |last| root(&mut parent, last));
             parent[one.max(other)] = one.min(other);
@@ -109,11 +109,9 @@ fn rigid_motions<const D: usize>(x: &Vector<f64, D>, centre: &Vector<f64, D>, si
     let axes = (0..D).map(|k| Vector::from_fn(|i, _| f64::from(i == k)));
     let planes = (0..D).flat_map(|i| (i + 1..D).map(move |k| (i, k)));
     let turns = planes.map(|(i, k)| {
-        Vector::from_fn(|c, _| match c {
-            _ if c == i => -arm[k],
-            _ if c == k => arm[i],
-            _ => 0.0,
-        })
+        let mut turn = Vector::zeros();
+        (turn[i], turn[k]) = (-arm[k], arm[i]);
+        turn
     });
     axes.chain(turns).collect()
 }

@@ -55,13 +55,13 @@ impl<const D: usize> Tangent<'_, D> {
     /// K u on the free degrees of freedom. `u` must be zero on prescribed degrees of freedom.
     pub fn product(&self, u: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
         out.fill(Vector::zeros());
-        let extended = self.unknowns.extended_in(self.supports, u);
+        let extended = self.unknowns.extended_in(self.supports.pool(), u);
         let u = extended.as_deref().unwrap_or(u);
         self.terms.iter().for_each(|term| term.add_product_at_nodes(u, out));
         let (modes, all): (Vec<_>, Vec<_>) =
             self.terms.iter().filter_map(|term| term.product_at_points(Some(u))).unzip();
         if let Some(mode) = modes.into_iter().reduce(Mode::and) {
-            self.supports.product(u, mode, out, |group, at, sums| {
+            self.supports.accumulate(Some(u), mode, out, |group, at, sums| {
                 all.iter().for_each(|add| add(group, at, sums));
             });
         }
@@ -114,19 +114,19 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     /// # Errors
     /// det F ≤ 0. The error names the particle with the smallest id.
     pub fn tangent(&self, dphi: &[Vector<f64, D>]) -> Result<Tangent<'_, D>, Inadmissible> {
-        self.linearized(None, dphi)
+        self.tangent_of(None, dphi)
     }
 
-    /// Linearises one piece of the residual at Δφ.
+    /// Linearises one piece of the residual at Δφ, or the whole.
     ///
     /// # Errors
     /// See [`Self::tangent`].
-    pub fn tangent_of(&self, piece: Piece, dphi: &[Vector<f64, D>]) -> Result<Tangent<'_, D>, Inadmissible> {
-        self.linearized(Some(piece), dphi)
-    }
-
-    fn linearized(&self, piece: Option<Piece>, dphi: &[Vector<f64, D>]) -> Result<Tangent<'_, D>, Inadmissible> {
-        let terms = self.terms.linearize(piece, &self.unknowns.extended(dphi))?;
+    pub fn tangent_of(
+        &self,
+        piece: impl Into<Option<Piece>>,
+        dphi: &[Vector<f64, D>],
+    ) -> Result<Tangent<'_, D>, Inadmissible> {
+        let terms = self.terms.linearize(piece.into(), &self.unknowns.extended(dphi))?;
         let (supports, particles) = (self.step.supports, self.step.particles);
         Ok(Tangent { supports, unknowns: self.unknowns.clone(), particles, terms })
     }
@@ -214,7 +214,7 @@ impl<const D: usize, L: Law> NonlinearProblem for Equilibrium<'_, D, L> {
     fn residual(&self, x: &[f64], r: &mut [f64]) -> Result<(), Inadmissible> {
         let residual = bytemuck::cast_slice_mut(r);
         self.residual_into::<f64>(bytemuck::cast_slice(x), residual)?;
-        self.clear_prescribed(residual);
+        self.unknowns.clear_prescribed(residual);
         Ok(())
     }
 

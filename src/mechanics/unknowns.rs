@@ -5,7 +5,7 @@ use crate::grid::indices;
 use crate::mechanics::loads::PrescribedDof;
 use crate::mechanics::sweep::{Quadratic, Supports};
 use crate::particles::Particles;
-use crate::pooled::Pooled;
+use crate::pooled::{Pool, Pooled};
 use crate::scalar::Real;
 use crate::tensor::{Tensor, Vector, identity};
 use std::borrow::Cow;
@@ -74,10 +74,8 @@ impl<const D: usize> Function<D> {
 impl<'a, const D: usize> Unknowns<'a, D> {
     pub fn new(supports: &Supports<D>, prescribed: &'a [PrescribedDof]) -> Self {
         let extension = supports.extension().cloned().unwrap_or_default();
-        Self {
-            prescribed,
-            followers: Followers::new(extension, prescribed.iter().map(|dof| (dof.node, dof.component))),
-        }
+        let fixed = prescribed.iter().map(|dof| (dof.node, dof.component));
+        Self { prescribed, followers: Followers::new(extension, fixed) }
     }
 
     /// E û
@@ -90,16 +88,10 @@ impl<'a, const D: usize> Unknowns<'a, D> {
     }
 
     /// E û in pooled memory; `None` if no node follows others.
-    pub(crate) fn extended_in(
-        &self,
-        supports: &Supports<D>,
-        field: &[Vector<f64, D>],
-    ) -> Option<Pooled<Vector<f64, D>>> {
-        (!self.followers.is_empty()).then(|| {
-            let mut field = supports.pool().collect(field.iter().copied());
-            self.followers.extend(&mut field);
-            field
-        })
+    pub fn extended_in(&self, pool: &Pool, field: &[Vector<f64, D>]) -> Option<Pooled<Vector<f64, D>>> {
+        let mut field = (!self.followers.is_empty()).then(|| pool.collect(field.iter().copied()))?;
+        self.followers.extend(&mut field);
+        Some(field)
     }
 
     /// Sets the prescribed entries to zero.

@@ -32,20 +32,33 @@ pub enum Failure {
 pub const INTERRUPTED: u8 = 130;
 
 impl Failure {
-    pub fn scene(error: impl Error + 'static) -> Self {
-        Self::Scene(Box::new(error))
+    pub fn scene(error: impl Into<Box<dyn Error>>) -> Self {
+        Self::Scene(error.into())
     }
 
-    pub fn run(error: impl Error + 'static) -> Self {
-        Self::Run(Box::new(error))
+    pub fn run(error: impl Into<Box<dyn Error>>) -> Self {
+        Self::Run(error.into())
     }
+
+    /// The operating system refuses to do `what`, such as `write a.json`.
+    fn system(what: impl Display) -> impl Fn(std::io::Error) -> Self {
+        let what = what.to_string();
+        move |source| Self::run(Refused { what: what.clone(), source })
+    }
+}
+
+#[derive(Debug, thiserror::Error)]
+#[error("cannot {what}")]
+struct Refused {
+    what: String,
+    source: std::io::Error,
 }
 
 /// Writes to standard output. A pipe that its reader has closed, as `head` does, is not an error.
 pub fn print(text: impl Display) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
     match writeln!(out, "{text}").and_then(|()| out.flush()) {
-        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(Failure::run(Unwritable(error))),
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(Failure::system("write to standard output")(error)),
         _ => Ok(()),
     }
 }
@@ -54,8 +67,3 @@ pub fn print(text: impl Display) -> Result<(), Failure> {
 pub fn tell(text: impl Display) {
     let _ = writeln!(std::io::stderr().lock(), "{text}");
 }
-
-/// Standard output cannot be written to.
-#[derive(Debug, thiserror::Error)]
-#[error("cannot write to standard output")]
-struct Unwritable(#[source] std::io::Error);

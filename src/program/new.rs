@@ -12,24 +12,18 @@ use std::fs::OpenOptions;
 use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 
+/// Names of problems, each with its scene.
+macro_rules! problems {
+    ($($name:ident)*) => {
+        [$((stringify!($name), include_str!(concat!("../../scenes/", stringify!($name), ".json")))),*]
+    };
+}
+
 /// Name and scene of every problem.
-const PROBLEMS: [(&str, &str); 15] = [
-    ("rebound", include_str!("../../scenes/rebound.json")),
-    ("collision", include_str!("../../scenes/collision.json")),
-    ("cantilever", include_str!("../../scenes/cantilever.json")),
-    ("compaction", include_str!("../../scenes/compaction.json")),
-    ("riemann_jump", include_str!("../../scenes/riemann_jump.json")),
-    ("ball_drop", include_str!("../../scenes/ball_drop.json")),
-    ("column_static", include_str!("../../scenes/column_static.json")),
-    ("elastica", include_str!("../../scenes/elastica.json")),
-    ("cook", include_str!("../../scenes/cook.json")),
-    ("ring", include_str!("../../scenes/ring.json")),
-    ("tube", include_str!("../../scenes/tube.json")),
-    ("cook_plastic", include_str!("../../scenes/cook_plastic.json")),
-    ("taylor", include_str!("../../scenes/taylor.json")),
-    ("slope", include_str!("../../scenes/slope.json")),
-    ("collapse", include_str!("../../scenes/collapse.json")),
-];
+const PROBLEMS: [(&str, &str); 15] = problems! {
+    rebound collision cantilever compaction riemann_jump ball_drop column_static elastica cook ring tube cook_plastic taylor slope
+    collapse
+};
 
 /// File name of the schema beside the scene.
 const SCHEMA: &str = "scene.schema.json";
@@ -48,15 +42,6 @@ pub struct New {
     problem: Option<String>,
     /// The file to write [default: the problem's name and .json]. An existing file is not overwritten.
     file: Option<PathBuf>,
-}
-
-/// A file that cannot be written.
-#[derive(Debug, thiserror::Error)]
-enum Refused {
-    #[error("{} exists and stays as it is: name another file (bfree new PROBLEM FILE), or remove it", .0.display())]
-    Exists(PathBuf),
-    #[error("cannot write {}", path.display())]
-    System { path: PathBuf, source: std::io::Error },
 }
 
 impl New {
@@ -97,18 +82,16 @@ fn explained(text: &str) -> Result<String, Failure> {
     let mut out = String::new();
     for key in keys::documented(&scene) {
         let mut line = format!("{:<KEY_WIDTH$}", key.path);
-        let mut room = LINE_WIDTH - KEY_WIDTH;
-        if line.chars().count() > KEY_WIDTH {
-            let _ = write!(line, "\n{:KEY_WIDTH$}", "");
-        }
+        let length = line.chars().count();
+        let mut column = if length > KEY_WIDTH { LINE_WIDTH } else { length };
         for word in key.about.split(' ') {
             let length = word.chars().count() + 1;
-            if length > room {
+            if column + length > LINE_WIDTH {
                 let _ = write!(line, "\n{:KEY_WIDTH$}", "");
-                room = LINE_WIDTH - KEY_WIDTH;
+                column = KEY_WIDTH;
             }
             let _ = write!(line, " {word}");
-            room = room.saturating_sub(length);
+            column += length;
         }
         let _ = writeln!(out, "{line}");
     }
@@ -117,11 +100,12 @@ fn explained(text: &str) -> Result<String, Failure> {
 
 /// Writes a new file. An existing file is an error.
 fn create(path: &Path, content: &str) -> Result<(), Failure> {
-    let path = path.to_owned();
-    let refused = |source: std::io::Error| match source.kind() {
-        ErrorKind::AlreadyExists => Failure::scene(Refused::Exists(path.clone())),
-        _ => Failure::run(Refused::System { path: path.clone(), source }),
-    };
-    let mut file = OpenOptions::new().write(true).create_new(true).open(&path).map_err(refused)?;
-    file.write_all(content.as_bytes()).map_err(refused)
+    let place = path.display();
+    let created = OpenOptions::new().write(true).create_new(true).open(path);
+    match created.and_then(|mut file| file.write_all(content.as_bytes())) {
+        Err(error) if error.kind() == ErrorKind::AlreadyExists => Err(Failure::scene(format!(
+            "{place} exists and stays as it is: name another file (bfree new PROBLEM FILE), or remove it"
+        ))),
+        written => written.map_err(Failure::system(format_args!("write {place}"))),
+    }
 }

@@ -4,8 +4,8 @@ use super::scene_arguments::SceneArguments;
 use super::{Failure, print};
 use bfree::output::plot;
 use bfree::scene::{Scene, time::MAX_STEPS};
-use bfree::simulation::{Simulation, StepReport};
-use bfree::solver::{Forcing, NewtonIteration};
+use bfree::simulation::StepReport;
+use bfree::solver::{Forcing, NewtonIteration, NewtonSettings};
 use clap::{Args, ValueEnum};
 use std::num::NonZeroU64;
 use std::ops::RangeInclusive;
@@ -147,7 +147,7 @@ impl Newton {
                 return taken.map(|_| ()).map_err(Failure::run);
             };
             if shown {
-                let solution = solution(step, &simulation, &report);
+                let solution = solution(step, &report);
                 if !solution.order().is_quadratic() {
                     slow.push(format!("{}: {}; {}", solution.name, solution.order(), cause(&solution, &report)));
                 }
@@ -180,11 +180,11 @@ fn write(path: &Path, content: &[u8]) -> Result<(), Failure> {
 }
 
 /// The residuals of a step.
-fn solution<const D: usize>(step: u64, simulation: &Simulation<D>, report: &StepReport<D>) -> Solution {
+fn solution<const D: usize>(step: u64, report: &StepReport<D>) -> Solution {
     let history = &report.newton.history;
     let mut norms: Vec<f64> = history.first_residual.into_iter().collect();
     norms.extend(history.iterations.iter().map(|one| one.residual));
-    let floor = ROUND_OFF * simulation.settings.newton.floor * f64::EPSILON;
+    let floor = ROUND_OFF * NewtonSettings::FLOOR * f64::EPSILON;
     let round_off = history.magnitude.map(|size| floor * size);
     // Below round-off, norms only scatter.
     let falls = norms.iter().position(|norm| round_off.is_some_and(|round_off| *norm <= round_off));

@@ -41,12 +41,12 @@ impl<const D: usize> Bound<D> {
 impl<const D: usize> Display for Bound<D> {
     fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
         let Self { probe: Probe { name, field, place }, particle, distance, .. } = self;
-        let (field, kept) = match place {
-            Place::Particle(_) => (field.name(), "follows"),
-            Place::Carried { .. } => (field.name(), "carried by"),
-            Place::Nearest { .. } => (field.name(), "fixed in space, first sees"),
+        let kept = match place {
+            Place::Particle(_) => "follows",
+            Place::Carried { .. } => "carried by",
+            Place::Nearest { .. } => "fixed in space, first sees",
         };
-        write!(f, "{name}: {field}, {kept} particle {particle}, {distance:.3e} from the place given")
+        write!(f, "{name}: {}, {kept} particle {particle}, {distance:.3e} from the place given", field.name())
     }
 }
 

@@ -2,14 +2,14 @@
 
 use super::probes::{Bound, bound_probes};
 use super::scene_arguments::{SceneArguments, what_accuracy_sets};
-use super::steps::{Schedule, Steps, Unwritten};
+use super::steps::{Schedule, Steps};
 use super::{Failure, INTERRUPTED, directory, print, tell};
 use bfree::checkpoint::{self, Checkpoints, Identity, Restored};
 use bfree::output::plot::{Look, plot_run};
 use bfree::output::{Audience, Outcome, OutputSettings, Recorder, Reference};
 use bfree::parallel;
 use bfree::plan::SurfaceUse;
-use bfree::scene::{Scene, SceneError, time::MAX_STEPS};
+use bfree::scene::{Scene, time::MAX_STEPS};
 use bfree::simulation::{AdvanceError, Simulation};
 use bfree::solver::Stop;
 use clap::{Args, ValueEnum};
@@ -82,15 +82,6 @@ enum Form {
     Json,
 }
 
-/// The checkpoint is later than the end of the run.
-#[derive(Debug, thiserror::Error)]
-#[error("{} is at t = {time}, beyond the end, t = {end}: give a later time.end or --until", path.display())]
-struct Past {
-    path: PathBuf,
-    time: f64,
-    end: f64,
-}
-
 impl Run {
     /// Whether messages are written as JSON, for a program.
     pub fn tells_json(&self) -> bool {
@@ -102,12 +93,15 @@ impl Run {
         let start = Instant::now();
         let mut scene = self.scene.read()?;
         if let Some(until) = self.until {
-            scene.time =
-                scene.time.until(until, "--until").map_err(|wrong| Failure::scene(SceneError::Values(wrong)))?;
+            // The end of the scene passed all checks, so every problem is one of the option.
+            scene.time.end = until;
+            let problems = scene.check();
+            if !problems.is_empty() {
+                return Err(Failure::scene(format!("--until: {problems}")));
+            }
         }
         if let Some(threads) = self.threads {
-            let threads = usize::try_from(threads).unwrap_or(usize::MAX);
-            parallel::use_threads(threads).map_err(Failure::run)?;
+            parallel::use_threads(threads as usize).map_err(Failure::run)?;
         }
         match scene.dimension() {
             1 => self.execute_in::<1>(&scene, start),
@@ -122,8 +116,7 @@ impl Run {
         simulation.settings.check_tangent = self.check_tangent.and_then(NonZeroU64::new);
         let directory = directory::of_results(self.out.as_deref(), &self.scene.scene)?;
         let probes = bound_probes(scene, &simulation);
-        let warnings = self.tell_before_the_run(scene, &simulation, &probes);
-        let inputs = self.inputs(scene, &simulation, &probes, &warnings, &directory)?;
+        let (inputs, warnings) = self.inputs(scene, &simulation, &probes, &directory)?;
         let settings = serde_json::to_value(scene).map_err(Failure::run)?;
         let identity = Identity::new(settings, &simulation.particles);
         let schedule = Schedule::new(&simulation.clock, scene.time.end, self.steps);
@@ -133,7 +126,11 @@ impl Run {
             snapshot_every: scene.output.every,
             probes: probes.iter().map(|bound| bound.probe.clone()).collect(),
             end_time: schedule.end_time(&simulation.clock),
-            audience: self.audience(),
+            audience: match self.progress {
+                _ if self.quiet => Audience::Nobody,
+                Form::Text => Audience::Person,
+                Form::Json => Audience::Program,
+            },
         };
         let interrupted = stop_on_interrupt().map_err(Failure::run)?;
         let asked_to_stop = interrupted.clone();
@@ -159,17 +156,25 @@ impl Run {
             Checkpoints::new(directory.clone(), identity, self.options(&directory), every, restored.as_ref())
         });
         let mut steps = Steps { simulation, recorder, checkpoints, schedule, interrupted };
-        let failure = steps.take().map_err(|unwritten| self.stopped_by(unwritten, &directory))?;
+        let failure = steps.take().map_err(|error| {
+            let (time, place) = (steps.simulation.clock.time(), directory.display());
+            self.say(
+                "stopped",
+                &format!("stopped at t = {time}; {place} holds what was written until then, and no report"),
+            );
+            Failure::Run(error)
+        })?;
         self.report(steps, failure, &inputs, &warnings, &directory)
     }
 
-    /// Tells what the scene leads to before the first step, and returns the warnings about the scene.
-    fn tell_before_the_run<const D: usize>(
+    /// The entries of the report that are known before the first step, and the warnings about the scene. Tells them, too.
+    fn inputs<const D: usize>(
         &self,
         scene: &Scene,
         simulation: &Simulation<D>,
         probes: &[Bound<D>],
-    ) -> Vec<String> {
+        directory: &Path,
+    ) -> Result<(Map<String, Value>, Vec<String>), Failure> {
         if let Some(set) = what_accuracy_sets(scene).filter(|_| !self.quiet) {
             self.say("accuracy", &format!("accuracy {set}"));
         }
@@ -177,43 +182,21 @@ impl Run {
         for text in probes.iter().filter_map(Bound::warning).chain(warnings.iter().cloned()) {
             self.say("warning", &text);
         }
-        warnings
-    }
-
-    /// The entries of the report that are known before the first step.
-    fn inputs<const D: usize>(
-        &self,
-        scene: &Scene,
-        simulation: &Simulation<D>,
-        probes: &[Bound<D>],
-        warnings: &[String],
-        directory: &Path,
-    ) -> Result<Map<String, Value>, Failure> {
-        let json = |value: Result<Value, serde_json::Error>| value.map_err(Failure::run);
-        let mut inputs = Map::new();
-        inputs.insert("command".to_owned(), self.options(directory));
-        inputs.insert("settings".to_owned(), json(serde_json::to_value(scene))?);
+        let (krylov, why_krylov) = simulation.krylov();
+        let (preconditioner, why_preconditioner) = simulation.preconditioner();
+        let mut inputs = Map::from_iter([
+            ("command".to_owned(), self.options(directory)),
+            ("settings".to_owned(), serde_json::to_value(scene).map_err(Failure::run)?),
+            ("krylov".to_owned(), json!({ "method": krylov.to_string(), "why": why_krylov })),
+            ("preconditioner".to_owned(), json!({ "method": preconditioner.to_string(), "why": why_preconditioner })),
+            ("scene_warnings".to_owned(), json!(warnings)),
+            ("probes".to_owned(), probes.iter().map(Bound::report).collect()),
+            ("surfaces".to_owned(), serde_json::to_value(SurfaceUse::of(simulation)).map_err(Failure::run)?),
+        ]);
         if let Some(accuracy) = scene.accuracy {
-            let sets = json(serde_json::to_value(&scene.chosen))?;
-            inputs.insert("accuracy".to_owned(), json!({ "asked": accuracy, "sets": sets }));
+            inputs.insert("accuracy".to_owned(), json!({ "asked": accuracy, "sets": scene.chosen }));
         }
-        let (method, why) = simulation.krylov();
-        inputs.insert("krylov".to_owned(), json!({ "method": method.to_string(), "why": why }));
-        let (preconditioner, why) = simulation.preconditioner();
-        inputs.insert("preconditioner".to_owned(), json!({ "method": preconditioner.to_string(), "why": why }));
-        inputs.insert("scene_warnings".to_owned(), json!(warnings));
-        inputs.insert("probes".to_owned(), probes.iter().map(Bound::report).collect());
-        inputs.insert("surfaces".to_owned(), json(serde_json::to_value(SurfaceUse::of(simulation)))?);
-        Ok(inputs)
-    }
-
-    /// Says that the results of a step could not be written.
-    fn stopped_by(&self, unwritten: Unwritten, directory: &Path) -> Failure {
-        let Unwritten { time, error } = unwritten;
-        let place = directory.display();
-        let text = format!("stopped at t = {time}; {place} holds what was written until then, and no report");
-        self.say("stopped", &text);
-        Failure::Run(error)
+        Ok((inputs, warnings))
     }
 
     /// Writes the report, the summary and the pictures of a run, and says how the run ended.
@@ -245,8 +228,7 @@ impl Run {
         }
         let time = steps.simulation.clock.time();
         if let Some(error) = failure {
-            let text = format!("stopped at t = {time} after the last good step; its state is in {place}");
-            self.say("stopped", &text);
+            self.say("stopped", &format!("stopped at t = {time} after the last good step; its state is in {place}"));
             return Err(Failure::run(error));
         }
         if is_interrupted {
@@ -268,31 +250,26 @@ impl Run {
         let restored = checkpoint::restore(directory, identity, simulation).map_err(Failure::scene)?;
         let time = simulation.clock.time();
         if simulation.clock.nominal_steps() > simulation.clock.whole_steps(end) {
-            return Err(Failure::scene(Past { path: restored.path, time, end }));
+            let path = restored.path.display();
+            let what = format!("{path} is at t = {time}, beyond the end, t = {end}: give a later time.end or --until");
+            return Err(Failure::scene(what));
         }
-        let unusable = restored.unusable.iter();
-        unusable.for_each(|one| self.say("warning", &format!("a checkpoint cannot be used: {one}")));
-        if !restored.missing.is_empty() {
-            let missing: Vec<_> = restored.missing.iter().map(|path| path.display().to_string()).collect();
+        let unusable = restored.unusable.iter().map(|one| format!("a checkpoint cannot be used: {one}"));
+        let missing: Vec<_> = restored.missing.iter().map(|path| path.display().to_string()).collect();
+        let missing = (!missing.is_empty()).then(|| {
             let text = "these snapshots of the run are not there any more, and its pictures leave them out";
-            self.say("warning", &format!("{text}: {}", missing.join(", ")));
-        }
-        if let Some(program) = &restored.other_program {
-            self.say("warning", &format!("the checkpoint was written by {program}: the bits may differ from then on"));
+            format!("{text}: {}", missing.join(", "))
+        });
+        let other = restored.other_program.as_ref();
+        let other = other.map(|by| format!("the checkpoint was written by {by}: the bits may differ from then on"));
+        for warning in unusable.chain(missing).chain(other) {
+            self.say("warning", &warning);
         }
         if !self.quiet {
-            let (time, path) = (simulation.clock.time(), restored.path.display());
-            self.say("restart", &format!("continues at t = {time}, step {}, from {path}", simulation.clock.steps()));
+            let (step, path) = (simulation.clock.steps(), restored.path.display());
+            self.say("restart", &format!("continues at t = {time}, step {step}, from {path}"));
         }
         Ok(restored)
-    }
-
-    fn audience(&self) -> Audience {
-        match self.progress {
-            _ if self.quiet => Audience::Nobody,
-            Form::Text => Audience::Person,
-            Form::Json => Audience::Program,
-        }
     }
 
     /// Writes a message beside the progress, in the form of the progress.

@@ -1,6 +1,6 @@
 //! The scene argument of a command, and `bfree check`.
 
-use super::probes::bound_probes;
+use super::probes::{Bound, bound_probes};
 use super::{Failure, print, tell};
 use bfree::material::allow_library;
 use bfree::memory;
@@ -10,7 +10,6 @@ use bfree::scene::{self, Override, Scene, SceneError};
 use bfree::simulation::Simulation;
 use clap::Args;
 use std::error::Error;
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 /// The scene file, and overrides of its keys.
@@ -51,15 +50,11 @@ impl SceneArguments {
         Failure::scene(Unusable { path: self.scene.clone(), source: Box::new(error) })
     }
 
-    /// The folder in which files named by the scene are looked for.
-    pub fn folder(&self) -> &Path {
-        self.scene.parent().unwrap_or(Path::new("."))
-    }
-
     /// Builds the simulation at t = 0. Too little memory for its particles is an error.
     pub fn build<const D: usize>(&self, scene: &Scene) -> Result<Simulation<D>, Failure> {
         let memory = memory::available().unwrap_or(u64::MAX);
-        scene.build_within::<D>(self.folder(), memory).map_err(|error| self.unusable(error))
+        let folder = self.scene.parent().unwrap_or(Path::new("."));
+        scene.build_within::<D>(folder, memory).map_err(|error| self.unusable(error))
     }
 
     /// The plan of a run: its terms and arrays. Too little memory for the arrays is an error.
@@ -84,39 +79,32 @@ impl SceneArguments {
 
     fn check_in<const D: usize>(&self, scene: &Scene) -> Result<(), Failure> {
         let simulation = self.build::<D>(scene)?;
-        let mut text = scene.title.as_ref().map_or_else(String::new, |title| format!("{title}\n"));
-        let steps = simulation.clock.whole_steps(scene.time.end);
-        // Writing to a string cannot fail.
-        if let Some(set) = what_accuracy_sets(scene) {
-            let _ = writeln!(text, "accuracy      {set}");
-        }
+        let mut lines: Vec<String> = scene.title.iter().cloned().collect();
+        lines.extend(what_accuracy_sets(scene).map(|set| format!("accuracy      {set}")));
         let (step, end) = (scene.time.step, scene.time.end);
+        let steps = simulation.clock.whole_steps(end);
         let rest = simulation.clock.rest(end).map_or_else(String::new, |rest| format!(" and one of {rest:.6}"));
-        let _ = writeln!(text, "steps         {steps} of {step}{rest} to t = {end}");
-        for body in scene.filled(&simulation) {
-            let _ = writeln!(text, "body          {body}");
-        }
+        lines.push(format!("steps         {steps} of {step}{rest} to t = {end}"));
+        lines.extend(scene.filled(&simulation).iter().map(|body| format!("body          {body}")));
         if simulation.bodies.len() > 1 {
             let h = scene.grid.spacing;
-            let felt = scene.approximation.contact_distance().map_or_else(
-                || "how far was not measured for these functions".to_owned(),
-                |cells| {
-                    format!("{:.4} to {:.4} apart ({} to {} spacings)", cells[0] * h, cells[1] * h, cells[0], cells[1])
-                },
-            );
-            let _ = writeln!(
-                text,
-                "contact       bodies feel each other before their surfaces meet: {felt}, see docs/src/limits.md"
-            );
+            let felt = match scene.approximation.contact_distance() {
+                Some([least, most]) => {
+                    format!("{:.4} to {:.4} apart ({least} to {most} spacings)", least * h, most * h)
+                }
+                None => "how far was not measured for these functions".to_owned(),
+            };
+            let contact = "contact       bodies feel each other before their surfaces meet";
+            lines.push(format!("{contact}: {felt}, see docs/src/limits.md"));
         }
-        let _ = write!(text, "{}", self.plan(&simulation)?);
-        let _ = write!(text, "\noutput        {}", written(scene));
-        for bound in bound_probes(scene, &simulation) {
-            let _ = write!(text, "\nprobe         {bound}");
-            bound.warning().into_iter().for_each(|text| tell(format_args!("warning: {text}")));
+        lines.push(self.plan(&simulation)?.to_string());
+        lines.push(format!("output        {}", written(scene)));
+        let probes = bound_probes(scene, &simulation);
+        lines.extend(probes.iter().map(|bound| format!("probe         {bound}")));
+        for warning in probes.iter().filter_map(Bound::warning).chain(scene.warnings(&simulation)) {
+            tell(format_args!("warning: {warning}"));
         }
-        scene.warnings(&simulation).iter().for_each(|text| tell(format_args!("warning: {text}")));
-        print(text)
+        print(lines.join("\n"))
     }
 }
 

@@ -63,50 +63,32 @@ pub struct Steps<const D: usize> {
     pub interrupted: Arc<AtomicBool>,
 }
 
-/// The results until a time could not be written.
-pub(crate) struct Unwritten {
-    pub time: f64,
-    pub error: Box<dyn Error>,
-}
-
 impl<const D: usize> Steps<D> {
     /// Takes steps until the end, an interruption, or a failed step, whose error is returned.
-    pub fn take(&mut self) -> Result<Option<AdvanceError>, Unwritten> {
+    ///
+    /// # Errors
+    /// The results cannot be written.
+    pub fn take(&mut self) -> Result<Option<AdvanceError>, Box<dyn Error>> {
         loop {
-            self.write_checkpoint_if_due()?;
+            if let Some(checkpoints) = &mut self.checkpoints {
+                checkpoints.write_if_due(&self.simulation, &mut self.recorder)?;
+            }
             let interrupted = self.interrupted.load(Ordering::Relaxed);
             if interrupted || self.schedule.whole_steps_are_taken(&self.simulation.clock) {
-                self.write_last_checkpoint()?;
+                // This checkpoint precedes the last snapshot and a shortened step. A longer run has neither of them here.
+                if let Some(mut checkpoints) = self.checkpoints.take() {
+                    checkpoints.write(&self.simulation, &mut self.recorder)?;
+                }
                 if interrupted || !self.schedule.shorten(&mut self.simulation.clock) {
                     return Ok(None);
                 }
             }
             match self.simulation.advance() {
-                Ok(step) => {
-                    let recorded = self.recorder.record(&self.simulation, &step);
-                    recorded.map_err(|error| self.unwritten(error))?;
-                }
+                Ok(step) => self.recorder.record(&self.simulation, &step)?,
                 // The next round of the loop handles the interruption.
                 Err(error) if error.cause.is_stopped() => {}
                 Err(error) => return Ok(Some(error)),
             }
         }
-    }
-
-    fn write_checkpoint_if_due(&mut self) -> Result<(), Unwritten> {
-        let Some(checkpoints) = &mut self.checkpoints else { return Ok(()) };
-        let written = checkpoints.write_if_due(&self.simulation, &mut self.recorder);
-        written.map_err(|error| self.unwritten(error))
-    }
-
-    /// Writes the checkpoint that precedes the last snapshot and a shortened step. A longer run has neither of them here.
-    fn write_last_checkpoint(&mut self) -> Result<(), Unwritten> {
-        let Some(mut checkpoints) = self.checkpoints.take() else { return Ok(()) };
-        let written = checkpoints.write(&self.simulation, &mut self.recorder);
-        written.map_err(|error| self.unwritten(error))
-    }
-
-    fn unwritten(&self, error: impl Error + 'static) -> Unwritten {
-        Unwritten { time: self.simulation.clock.time(), error: Box::new(error) }
     }
 }

@@ -1,5 +1,6 @@
 //! Bodies: shape or particles, material, and initial velocity.
 
+use super::default_number;
 use super::grid::GridBox;
 use super::shape::Shape;
 use crate::material::{self, Law};
@@ -33,7 +34,7 @@ pub struct Body {
     /// The initial velocity, uniform in the body. Default: the velocities of the particle file, or zeros.
     pub velocity: Option<Vec<f64>>,
     /// Particles per cell along each axis, 1 to 100; 2 gives the quarter points. Default 2.
-    #[serde(default = "Body::default_particles_per_cell")]
+    #[serde(default = "default_number::<2>")]
     #[schemars(range(min = 1, max = 100))]
     pub particles_per_cell: u32,
     /// Positions of the particles in cells that the body fills. Default: `"regular"` if the grid is reset in every step, and with uGIMP
@@ -54,32 +55,15 @@ pub struct ParticleFile {
 }
 
 impl Body {
-    fn default_particles_per_cell() -> u32 {
-        2
-    }
-
     pub(super) fn check(&self, problems: &mut Problems, path: &str, grid: &GridBox) {
         let dimension = grid.dimension();
-        problems.require(
-            !self.name.is_empty(),
-            &format!("{path}.name"),
-            "an empty name",
-            "must have at least one letter",
-        );
-        problems.require(
-            !self.name.contains(char::is_control),
-            &format!("{path}.name"),
-            format_args!("{:?}", self.name),
-            "must be of letters that can be printed",
-        );
+        let name = format!("{path}.name");
+        problems.require(!self.name.is_empty(), &name, "an empty name", "must have at least one letter");
+        let printed = !self.name.contains(char::is_control);
+        problems.require(printed, &name, format_args!("{:?}", self.name), "must be of letters that can be printed");
         match (&self.shape, &self.particles) {
             (Some(shape), None) => {
-                let path = format!("{path}.shape");
-                match dimension {
-                    1 => check_inside::<1>(shape, problems, &path, grid),
-                    2 => check_inside::<2>(shape, problems, &path, grid),
-                    _ => check_inside::<3>(shape, problems, &path, grid),
-                }
+                check_inside(shape, problems, &format!("{path}.shape"), grid);
             }
             (None, Some(particles)) => {
                 let empty = particles.file.as_os_str().is_empty();
@@ -90,12 +74,10 @@ impl Body {
         }
         let law = self.material.law(problems, &format!("{path}.material"));
         if let Some(law) = law.filter(|_| self.volumetric == Dilatation::MeanDilatation) {
-            problems.require(
-                law.volumetric(&Deformation::<f64, 1>::new(Tensor::zeros())).is_some(),
-                &format!("{path}.volumetric"),
-                "\"mean_dilatation\"",
-                "must be of a law whose energy has a part that depends on the volume alone, which this one has not",
-            );
+            let has_part = law.volumetric(&Deformation::<f64, 1>::new(Tensor::zeros())).is_some();
+            let allowed =
+                "must be of a law whose energy has a part that depends on the volume alone, which this one has not";
+            problems.require(has_part, &format!("{path}.volumetric"), "\"mean_dilatation\"", allowed);
         }
         problems.positive(&format!("{path}.density"), self.density);
         if let Some(velocity) = &self.velocity {
@@ -107,28 +89,21 @@ impl Body {
 
 /// Refuses a shape that is empty or whose finite part reaches beyond the box: that part would be lost silently. Only infinite shapes are
 /// clipped.
-fn check_inside<const D: usize>(shape: &Shape, problems: &mut Problems, path: &str, grid: &GridBox) {
-    let (Some(shape), Some(grid)) = (shape.checked::<D>(problems, path), grid.build::<D>()) else { return };
-    let (min, max) = shape.bounding_box();
-    if (0..D).any(|k| max[k] < min[k]) {
-        problems.refuse(
-            path,
-            "an empty shape",
-            "must hold something: its parts do not meet, or nothing is left of them",
-        );
-        return;
+fn check_inside(shape: &Shape, problems: &mut Problems, path: &str, grid: &GridBox) {
+    let bounds = shape.check(problems, path, grid.dimension());
+    let (Some([min, max]), Some(cells)) = (bounds, grid.cells()) else { return };
+    if min.iter().zip(&max).any(|(min, max)| max < min) {
+        let allowed = "must hold something: its parts do not meet, or nothing is left of them";
+        return problems.refuse(path, "an empty shape", allowed);
     }
-    let slack = EDGE * grid.spacing;
-    for k in 0..D {
-        let (lower, upper) = (grid.origin[k], grid.origin[k] + f64::from(grid.cells[k]) * grid.spacing);
-        let beyond = (min[k].is_finite() && min[k] < lower - slack) || (max[k].is_finite() && max[k] > upper + slack);
-        let apart = max[k] <= lower || min[k] >= upper;
-        let axis = ["x", "y", "z"][k.min(2)];
-        problems.require(
-            !beyond && !apart,
-            path,
-            format_args!("a shape from {axis} = {} to {}", Number(min[k]), Number(max[k])),
-            format_args!("must lie in the grid, from {axis} = {} to {}", Number(lower), Number(upper)),
-        );
+    let (slack, origin) = (EDGE * grid.spacing, grid.origin());
+    for (k, axis) in ["x", "y", "z"].into_iter().enumerate().take(grid.dimension()) {
+        let (min, max) = (min[k], max[k]);
+        let (lower, upper) = (origin[k], origin[k] + f64::from(cells[k]) * grid.spacing);
+        let beyond = (min.is_finite() && min < lower - slack) || (max.is_finite() && max > upper + slack);
+        let apart = max <= lower || min >= upper;
+        let found = format!("a shape from {axis} = {} to {}", Number(min), Number(max));
+        let allowed = format!("must lie in the grid, from {axis} = {} to {}", Number(lower), Number(upper));
+        problems.require(!beyond && !apart, path, found, allowed);
     }
 }

@@ -2,6 +2,7 @@
 
 use super::curve::{Curve, check_times};
 use super::shape::Shape;
+use super::vector::check_axis;
 use crate::problems::{Number, Problems};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -81,50 +82,29 @@ pub struct Rotation {
     pub angle: Curve,
 }
 
-/// A prescribed motion.
-#[derive(Clone, Copy)]
-pub(super) enum Driving<'a> {
-    Displacement(&'a Table),
-    Velocity(&'a Table),
-    Rotation(&'a Rotation),
-}
-
 impl Face {
-    /// The prescribed motion of the face, if there is one.
-    pub(super) fn driving(&self) -> Option<Driving<'_>> {
+    /// Whether the condition moves nodes.
+    pub(super) fn moves(&self) -> bool {
         match self {
-            Self::Displacement(table) => Some(Driving::Displacement(table)),
-            Self::Velocity(table) => Some(Driving::Velocity(table)),
-            Self::Rotation(rotation) => Some(Driving::Rotation(rotation)),
-            Self::Free | Self::Sliding | Self::Fixed | Self::Held(_) => None,
-        }
-    }
-}
-
-impl Driving<'_> {
-    /// The key of the motion in a scene.
-    pub(super) fn key(self) -> &'static str {
-        match self {
-            Self::Displacement(_) => "displacement",
-            Self::Velocity(_) => "velocity",
-            Self::Rotation(_) => "rotation",
-        }
-    }
-
-    /// Whether any value of the motion is non-zero.
-    pub(super) fn moves(self) -> bool {
-        match self {
-            Self::Displacement(table) | Self::Velocity(table) => table.largest() > 0.0,
+            Self::Displacement(table) | Self::Velocity(table) => {
+                table.0.iter().flat_map(|row| row.1.iter().flatten()).any(|x| *x != 0.0)
+            }
             Self::Rotation(rotation) => rotation.angle.0.iter().any(|row| row[1] != 0.0),
+            Self::Free | Self::Sliding | Self::Fixed | Self::Held(_) => false,
         }
     }
 
-    fn check(self, problems: &mut Problems, path: &str, dimension: usize) {
-        let path = format!("{path}.{}", self.key());
+    fn check(&self, problems: &mut Problems, path: &str, dimension: usize) {
         match self {
-            Self::Displacement(table) => table.check(problems, &path, dimension, true),
-            Self::Velocity(table) => table.check(problems, &path, dimension, false),
-            Self::Rotation(rotation) => rotation.check(problems, &path, dimension),
+            Self::Free | Self::Sliding | Self::Fixed => {}
+            Self::Held(held) => drop(problems.length(&format!("{path}.held"), held.len(), dimension)),
+            Self::Displacement(table) => {
+                let path = format!("{path}.displacement");
+                table.check(problems, &path, dimension);
+                table.check_start(problems, &path);
+            }
+            Self::Velocity(table) => table.check(problems, &format!("{path}.velocity"), dimension),
+            Self::Rotation(rotation) => rotation.check(problems, &format!("{path}.rotation"), dimension),
         }
     }
 }
@@ -146,33 +126,21 @@ impl Boundary {
 
     /// All faces by name, lower and upper, axis after axis.
     pub(super) fn faces(&self) -> [(&'static str, Option<&Face>); 6] {
-        [
-            ("left", self.left.as_ref()),
-            ("right", self.right.as_ref()),
-            ("bottom", self.bottom.as_ref()),
-            ("top", self.top.as_ref()),
-            ("back", self.back.as_ref()),
-            ("front", self.front.as_ref()),
-        ]
+        let Self { left, right, bottom, top, back, front } = self;
+        let named =
+            [("left", left), ("right", right), ("bottom", bottom), ("top", top), ("back", back), ("front", front)];
+        named.map(|(name, face)| (name, face.as_ref()))
     }
 
     pub(super) fn check(&self, problems: &mut Problems, dimension: usize) {
         for (i, (name, face)) in self.faces().into_iter().enumerate() {
             let Some(face) = face else { continue };
             let path = format!("boundary.{name}");
-            if i / 2 >= dimension {
-                let allowed = format!("a grid of {dimension} dimension(s) has no such face");
-                problems.refuse(&path, "a condition", allowed);
-                continue;
+            if i < 2 * dimension {
+                face.check(problems, &path, dimension);
+            } else {
+                problems.refuse(&path, "a condition", format!("a grid of {dimension} dimension(s) has no such face"));
             }
-            match face {
-                Face::Free | Face::Sliding | Face::Fixed => {}
-                Face::Held(held) => {
-                    problems.length(&format!("{path}.held"), held.len(), dimension);
-                }
-                Face::Displacement(_) | Face::Velocity(_) | Face::Rotation(_) => {}
-            }
-            face.driving().into_iter().for_each(|driving| driving.check(problems, &path, dimension));
         }
     }
 }
@@ -180,41 +148,31 @@ impl Boundary {
 impl Prescribed {
     pub(super) fn check(&self, problems: &mut Problems, path: &str, dimension: usize) {
         self.region.check(problems, &format!("{path}.region"), dimension);
-        let given: Vec<_> = self.given().collect();
-        given.iter().for_each(|driving| driving.check(problems, path, dimension));
+        let given = self.given();
+        given.iter().for_each(|(_, motion)| motion.check(problems, path, dimension));
         match given.as_slice() {
             [_] => {}
             [] => problems.refuse(path, "a region alone", "give its displacement, its velocity or its rotation"),
             several => {
-                let keys: Vec<_> = several.iter().map(|driving| driving.key()).collect();
+                let keys: Vec<_> = several.iter().map(|(key, _)| *key).collect();
                 problems.refuse(path, keys.join(" and "), "give one of them");
             }
         }
     }
 
-    /// All given motions; a checked scene has exactly one.
-    pub(super) fn given(&self) -> impl Iterator<Item = Driving<'_>> {
-        let (displacement, velocity, rotation) = (&self.displacement, &self.velocity, &self.rotation);
-        let tables = displacement.iter().map(Driving::Displacement).chain(velocity.iter().map(Driving::Velocity));
-        tables.chain(rotation.iter().map(Driving::Rotation))
+    /// All given motions, with their keys; a checked scene has exactly one.
+    pub(super) fn given(&self) -> Vec<(&'static str, Face)> {
+        let displacement = self.displacement.clone().map(|table| ("displacement", Face::Displacement(table)));
+        let velocity = self.velocity.clone().map(|table| ("velocity", Face::Velocity(table)));
+        let rotation = self.rotation.clone().map(|rotation| ("rotation", Face::Rotation(rotation)));
+        [displacement, velocity, rotation].into_iter().flatten().collect()
     }
 }
 
 impl Rotation {
     fn check(&self, problems: &mut Problems, path: &str, dimension: usize) {
         problems.vector(&format!("{path}.center"), &self.center, dimension);
-        let axis_path = format!("{path}.axis");
-        match (&self.axis, dimension) {
-            (_, 1) => problems.refuse(path, "a rotation", "a grid of one dimension has none"),
-            (None, 3) => problems.refuse(path, "a rotation without an axis", "give its axis, three numbers"),
-            (Some(_), 2) => problems.refuse(&axis_path, "an axis", "in 2D it is z: remove it"),
-            (Some(axis), _) => {
-                problems.vector(&axis_path, axis, dimension);
-                let some = axis.iter().any(|&x| x != 0.0);
-                problems.require(some, &axis_path, "zero", "must have a length");
-            }
-            (None, _) => {}
-        }
+        check_axis(problems, path, self.axis.as_deref(), dimension);
         let path = format!("{path}.angle");
         self.angle.check(problems, &path);
         if let Some([t, angle]) = self.angle.0.first().filter(|first| **first != [0.0, 0.0]) {
@@ -225,42 +183,40 @@ impl Rotation {
 }
 
 impl Table {
-    /// The largest magnitude in the table.
-    pub(super) fn largest(&self) -> f64 {
-        self.0.iter().flat_map(|row| row.1.iter().flatten()).fold(0.0, |most: f64, x| most.max(x.abs()))
-    }
-
-    fn check(&self, problems: &mut Problems, path: &str, dimension: usize, from_zero: bool) {
+    fn check(&self, problems: &mut Problems, path: &str, dimension: usize) {
         check_times(problems, path, self.0.iter().map(|row| row.0));
-        let Some(first) = self.0.first() else { return };
-        if first.0 != 0.0 {
-            problems.refuse(
-                &format!("{path}[0][0]"),
-                Number(first.0),
-                "must be 0: the table starts with the simulation",
-            );
-        }
+        let Some(Row(start, first)) = self.0.first() else { return };
+        let allowed = "must be 0: the table starts with the simulation";
+        problems.require(*start == 0.0, &format!("{path}[0][0]"), Number(*start), allowed);
         for (i, Row(_, row)) in self.0.iter().enumerate() {
-            let right_length = problems.length(&format!("{path}[{i}][1]"), row.len(), dimension);
-            for (k, component) in row.iter().enumerate().filter(|_| right_length) {
+            if !problems.length(&format!("{path}[{i}][1]"), row.len(), dimension) {
+                continue;
+            }
+            for (k, component) in row.iter().enumerate() {
                 let path = format!("{path}[{i}][1][{k}]");
                 if let Some(x) = component {
                     problems.number(&path, *x);
                 }
-                let as_first = first.1.get(k).is_none_or(|start| start.is_some() == component.is_some());
+                let as_first = first.get(k).is_none_or(|start| start.is_some() == component.is_some());
                 let found = component.map_or("null".to_owned(), |x| Number(x).to_string());
                 problems.require(as_first, &path, found, "a component must be null in every row or in none");
             }
         }
-        if first.1.iter().all(Option::is_none) {
-            problems.refuse(&format!("{path}[0][1]"), "a row without numbers", "must prescribe at least one component");
-        }
-        for (k, start) in first.1.iter().enumerate() {
-            let Some(start) = start.filter(|start| from_zero && *start != 0.0) else {
-                continue;
-            };
+        let some = first.iter().any(Option::is_some);
+        problems.require(
+            some,
+            &format!("{path}[0][1]"),
+            "a row without numbers",
+            "must prescribe at least one component",
+        );
+    }
+
+    /// Refuses displacements that do not start from zero.
+    fn check_start(&self, problems: &mut Problems, path: &str) {
+        let first = self.0.first().into_iter().flat_map(|row| row.1.iter().enumerate());
+        for (k, start) in first.filter_map(|(k, start)| Some((k, (*start)?))) {
             let allowed = "must be 0: displacements are counted from the start";
-            problems.refuse(&format!("{path}[0][1][{k}]"), Number(start), allowed);
+            problems.require(start == 0.0, &format!("{path}[0][1][{k}]"), Number(start), allowed);
         }
     }
 }

@@ -1,19 +1,41 @@
 //! Builds a simulation from a checked scene. Here and nowhere else, the dimension becomes a type: see [`Scene::dimension`].
 
-use super::filling::Means;
+use super::filling::Builder;
 use super::transfer::Transfer;
 use super::vector::vector;
-use super::{BuildError, Problems, Scene, shape};
+use super::{Problems, Scene, shape};
 use crate::approximation::{Approximation, Cells};
 use crate::clock::Clock;
 use crate::grid::Grid;
+use crate::mechanics::loads::CurveError;
 use crate::mechanics::smoothing::Smoothing;
 use crate::particles::{self, Particles};
 use crate::shape::Shape;
 use crate::simulation::{Settings, Simulation};
 use crate::solver::NewtonSettings;
 use crate::tensor::Vector;
+use std::error::Error;
 use std::path::Path;
+
+/// Errors of building a simulation from a scene.
+#[derive(Debug, thiserror::Error)]
+pub enum BuildError {
+    /// Values that are not allowed: those of shapes read from files, or of a scene that was changed after it was read.
+    #[error("{0}")]
+    Values(Problems),
+    /// A table in time that was changed after the scene was read.
+    #[error(transparent)]
+    Curve(#[from] CurveError),
+    /// A failure that appears only with the particles, or in a file: the key, the cause, and what to do.
+    #[error("{0}: {1}")]
+    At(String, #[source] Box<dyn Error + Send + Sync>),
+}
+
+impl BuildError {
+    pub(super) fn at(path: impl Into<String>, source: impl Into<Box<dyn Error + Send + Sync>>) -> Self {
+        Self::At(path.into(), source.into())
+    }
+}
 
 impl Scene {
     /// The dimension: 1 (uniaxial strain), 2 (plane strain) or 3.
@@ -66,15 +88,15 @@ impl Scene {
         let mut problems = self.check();
         let approximation = self.shape_functions(&mut Problems::default()).filter(|_| problems.is_empty());
         let approximation = approximation.ok_or_else(|| BuildError::Values(std::mem::take(&mut problems)))?;
-        let means = Means { folder, memory };
-        let mut particles = Particles::default();
+        let mut builder = Builder { scene: self, folder, memory, grid, particles: Particles::default() };
         let mut bodies = Vec::new();
         for (i, (body, law)) in self.bodies.iter().zip(self.laws()).enumerate() {
-            self.fill(body, &format!("bodies[{i}]"), &means, &grid, i as u32, &mut particles)?;
+            builder.fill(i, body)?;
             let (name, density, dilatation) = (body.name.clone(), body.density, body.volumetric);
             bodies.push(particles::Body { name, law, density, dilatation });
         }
-        let loads = self.loads(&means, &grid, &mut particles)?;
+        let loads = builder.loads()?;
+        let mut particles = builder.particles;
         particles.set_internal_to_rest(&bodies);
         let clock = Clock::new(self.time.step, self.time.max_halvings);
         let mut simulation = Simulation {

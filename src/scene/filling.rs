@@ -1,11 +1,11 @@
 //! Fills bodies with particles, finds their surfaces, and reports their volumes and masses.
 
 use super::body::Body;
-use super::boundary::Face;
 use super::particle_file;
 use super::vector::vector;
 use super::{BuildError, Scene};
 use crate::grid::{Grid, indices};
+use crate::mechanics::loads::CurveError;
 use crate::mechanics::reference::GridReset;
 use crate::particles::Particles;
 use crate::shape::{Facet, Filling, Layout, SURFACE_DEPTH, Shape, around, fill};
@@ -41,94 +41,126 @@ impl Display for BodyUse {
     }
 }
 
-/// The folder and the memory for filling bodies.
-pub(super) struct Means<'a> {
+/// The grid and the particles of a simulation that is being built.
+pub(super) struct Builder<'a, const D: usize> {
+    pub scene: &'a Scene,
     /// Folder of the particle files.
     pub folder: &'a Path,
     /// Available memory in bytes.
     pub memory: u64,
+    pub grid: Grid<D>,
+    pub particles: Particles<D>,
 }
 
-impl Means<'_> {
+impl<const D: usize> Builder<'_, D> {
     /// Reserves room for `more` particles. A step stores the state at its start and at its end. Shape functions and the linearised tangent
     /// need more memory than a state, so three states are a lower bound. The exact amount is known only once the shape functions are.
-    pub(crate) fn make_room<const D: usize>(
-        &self,
-        path: &str,
-        particles: &mut Particles<D>,
-        more: usize,
-    ) -> Result<(), BuildError> {
-        let count = particles.len() + more;
-        let (needed, memory) = (3 * (count * Particles::<D>::BYTES) as u64, self.memory);
-        if needed > memory {
-            return Err(BuildError::at(
-                path,
-                format!(
-                    "{count} particles so far need at least {} of memory, and {} can be had: use a coarser grid, fewer particles per \
-                     cell or a smaller body",
-                    BinaryBytes(needed),
-                    BinaryBytes(memory)
-                ),
-            ));
+    pub fn make_room(&mut self, path: &str, more: usize) -> Result<(), BuildError> {
+        let count = self.particles.len() + more;
+        let needed = 3 * (count * Particles::<D>::BYTES) as u64;
+        if needed > self.memory {
+            let (needed, memory) = (BinaryBytes(needed), BinaryBytes(self.memory));
+            let what = format!(
+                "{count} particles so far need at least {needed} of memory, and {memory} can be had: use a coarser grid, fewer particles \
+                 per cell or a smaller body"
+            );
+            return Err(BuildError::at(path, what));
         }
-        particles.reserve(more);
+        self.particles.reserve(more);
         Ok(())
+    }
+
+    /// Appends a particle. Without inertia, particles have no velocities.
+    pub fn push(&mut self, x: Vector<f64, D>, velocity: Vector<f64, D>, volume: f64, mass: f64, body: usize) {
+        if self.scene.time.scheme().has_inertia() {
+            self.particles.push(x, velocity, volume, mass, body as u32);
+        } else {
+            self.particles.push_without_inertia(x, volume, mass, body as u32);
+        }
+    }
+
+    /// Appends the particles of body `number`.
+    pub fn fill(&mut self, number: usize, body: &Body) -> Result<(), BuildError> {
+        let common = body.velocity.as_ref().map(|v| vector::<D>(v));
+        if let Some(shape) = &body.shape {
+            let path = format!("bodies[{number}].shape");
+            let velocity = common.unwrap_or_else(Vector::zeros);
+            let seeds = fill(&self.grid, &shape.built(&path)?, self.scene.filling(body));
+            let seeds = seeds.map_err(|source| BuildError::at(&path, source))?;
+            self.make_room(&path, seeds.len())?;
+            for seed in seeds {
+                self.push(seed.position, velocity, seed.volume, body.density * seed.volume, number);
+            }
+        } else if let Some(file) = &body.particles {
+            let path = format!("bodies[{number}].particles.file");
+            let place = self.folder.join(&file.file);
+            let fail = |what: String| BuildError::at(&path, format!("{}{what}", place.display()));
+            let read = particle_file::read_file::<D>(&place).map_err(|error| fail(format!(": {error}")))?;
+            if let Some(why) = self.scene.refuses_velocities().filter(|_| read.velocities.is_some()) {
+                return Err(fail(format!(" gives velocities, and {why}")));
+            }
+            self.make_room(&path, read.positions.len())?;
+            for (k, (x, &volume)) in read.positions.iter().zip(&read.volumes).enumerate() {
+                if !self.grid.contains(x) {
+                    let (line, place) = (k + 1, x.as_slice());
+                    let what = format!("particle {line} of the file, at {place:?}, lies outside the grid");
+                    return Err(BuildError::at(&path, what));
+                }
+                let own = read.velocities.as_ref().map(|velocities| velocities[k]);
+                self.push(*x, common.or(own).unwrap_or_else(Vector::zeros), volume, body.density * volume, number);
+            }
+        }
+        Ok(())
+    }
+
+    /// The surface of a body as facets, one by one for the boxes of a cut cell. Faces of the grid's box that hold the normal component are
+    /// planes of symmetry, and not part of the surface.
+    pub fn facets(
+        &self,
+        body: &Body,
+        shape: &Shape<D>,
+        region: Option<&Shape<D>>,
+    ) -> Result<Vec<Facet<D>>, CurveError> {
+        let (grid, filling) = (&self.grid, self.scene.filling(body));
+        let (h, n) = (grid.spacing, u64::from(filling.boxes_at_surface()));
+        let edges = Vector::repeat(h / n as f64);
+        let (first, count) = around(grid, shape);
+        // The planes of symmetry: their axis, coordinate and outward normal.
+        let mut planes = Vec::new();
+        for k in 0..D {
+            for (upper, wall, outward) in [(false, grid.origin[k], -1.0), (true, grid.position(grid.cells)[k], 1.0)] {
+                if self.scene.boundary.face(k, upper).motion::<D>(k)?[k].is_some() {
+                    planes.push((k, wall, outward));
+                }
+            }
+        }
+        let goes_on = |facet: &Facet<D>| {
+            let on = |&(k, wall, outward): &(usize, f64, f64)| {
+                (facet.position[k] - wall).abs() < SURFACE_DEPTH * h && facet.normal[k] * outward > 0.5
+            };
+            planes.iter().any(on)
+        };
+        let mut facets = Vec::new();
+        for cell in indices(count) {
+            let corner: Vector<f64, D> = Vector::from_fn(|k, _| grid.origin[k] + (first[k] + cell[k]) as f64 * h);
+            let middle = corner.add_scalar(0.5 * h);
+            if shape.signed_distance(&middle).abs() > h * (D as f64).sqrt() {
+                continue;
+            }
+            for i in indices([n; D]) {
+                let lower = corner + Vector::from_fn(|k, _| i[k] as f64 * edges[k]);
+                facets.extend(match filling.layout {
+                    Layout::Regular => shape.facets(region, &lower, &edges, h),
+                    Layout::Gauss => shape.surface_points(region, &lower, &edges, h),
+                });
+            }
+        }
+        facets.retain(|facet| !goes_on(facet));
+        Ok(facets)
     }
 }
 
 impl Scene {
-    /// Appends the particles of body `number`.
-    pub(super) fn fill<const D: usize>(
-        &self,
-        body: &Body,
-        path: &str,
-        means: &Means<'_>,
-        grid: &Grid<D>,
-        number: u32,
-        particles: &mut Particles<D>,
-    ) -> Result<(), BuildError> {
-        let has_inertia = self.time.scheme().has_inertia();
-        let push = |particles: &mut Particles<D>, x: Vector<f64, D>, velocity: Vector<f64, D>, volume: f64| {
-            let mass = body.density * volume;
-            if has_inertia {
-                particles.push(x, velocity, volume, mass, number)
-            } else {
-                particles.push_without_inertia(x, volume, mass, number)
-            }
-        };
-        let common = body.velocity.as_ref().map(|v| vector::<D>(v));
-        if let Some(shape) = &body.shape {
-            let path = format!("{path}.shape");
-            let velocity = common.unwrap_or_else(Vector::zeros);
-            let seeds = fill(grid, &shape.built(&path)?, self.filling(body));
-            let seeds = seeds.map_err(|source| BuildError::at(&path, source))?;
-            means.make_room(&path, particles, seeds.len())?;
-            for seed in seeds {
-                push(particles, seed.position, velocity, seed.volume);
-            }
-        } else if let Some(file) = &body.particles {
-            let path = format!("{path}.particles.file");
-            let place = means.folder.join(&file.file);
-            let fail = |what: String| BuildError::at(&path, format!("{}{what}", place.display()));
-            let read = particle_file::read_file::<D>(&place).map_err(|error| fail(format!(": {error}")))?;
-            if let Some(why) = self.refuses_velocities().filter(|_| read.velocities.is_some()) {
-                return Err(fail(format!(" gives velocities, and {why}")));
-            }
-            means.make_room(&path, particles, read.positions.len())?;
-            for (k, (x, &volume)) in read.positions.iter().zip(&read.volumes).enumerate() {
-                if !grid.contains(x) {
-                    let (number, place) = (k + 1, x.as_slice());
-                    let what = format!("particle {number} of the file, at {place:?}, lies outside the grid");
-                    return Err(BuildError::at(&path, what));
-                }
-                let own = read.velocities.as_ref().map(|velocities| velocities[k]);
-                let velocity = common.or(own).unwrap_or_else(Vector::zeros);
-                push(particles, *x, velocity, volume);
-            }
-        }
-        Ok(())
-    }
-
     /// The reason why a file of particles must give no velocities, and what to remove.
     fn refuses_velocities(&self) -> Option<&'static str> {
         if !self.time.scheme().has_inertia() {
@@ -194,8 +226,8 @@ impl Scene {
             Some(indices(count).map(|cell| shape.part(&lower(cell), &edges, grid.spacing).0).sum::<f64>())
         };
         let of = |(number, body): (usize, &Body)| {
-            let own =
-                || (0..particles.len()).filter(|&p| particles.body[p] as usize == number && particles.is_solid(p));
+            let is_own = |p: &usize| particles.body[*p] as usize == number && particles.is_solid(*p);
+            let own = || (0..particles.len()).filter(is_own);
             BodyUse {
                 name: body.name.clone(),
                 particles: own().count(),
@@ -205,60 +237,5 @@ impl Scene {
             }
         };
         self.bodies.iter().enumerate().map(of).collect()
-    }
-
-    /// The surface of a body as facets, one by one for the boxes of a cut cell. Faces of the grid's box that hold the normal component are
-    /// planes of symmetry, and not part of the surface.
-    pub(super) fn facets<const D: usize>(
-        &self,
-        body: &Body,
-        shape: &Shape<D>,
-        region: Option<&Shape<D>>,
-        grid: &Grid<D>,
-    ) -> Vec<Facet<D>> {
-        let filling = self.filling(body);
-        let (h, n) = (grid.spacing, u64::from(filling.boxes_at_surface()));
-        let edges = Vector::repeat(h / n as f64);
-        let (first, count) = around(grid, shape);
-        let goes_on = |facet: &Facet<D>| {
-            (0..2 * D).any(|face| {
-                let (k, upper) = (face / 2, face % 2 == 1);
-                let (wall, outward) = if upper { (grid.position(grid.cells)[k], 1.0) } else { (grid.origin[k], -1.0) };
-                let there = (facet.position[k] - wall).abs() < SURFACE_DEPTH * h && facet.normal[k] * outward > 0.5;
-                there && self.boundary.face(k, upper).holds_across(k)
-            })
-        };
-        let mut facets = Vec::new();
-        for cell in indices(count) {
-            let corner: Vector<f64, D> = Vector::from_fn(|k, _| grid.origin[k] + (first[k] + cell[k]) as f64 * h);
-            let middle = corner.add_scalar(0.5 * h);
-            if shape.signed_distance(&middle).abs() > h * (D as f64).sqrt() {
-                continue;
-            }
-            for i in indices([n; D]) {
-                let lower = corner + Vector::from_fn(|k, _| i[k] as f64 * edges[k]);
-                facets.extend(match filling.layout {
-                    Layout::Regular => shape.facets(region, &lower, &edges, h),
-                    Layout::Gauss => shape.surface_points(region, &lower, &edges, h),
-                });
-            }
-        }
-        facets.retain(|facet| !goes_on(facet));
-        facets
-    }
-}
-
-impl Face {
-    /// Whether the condition prescribes the component along `axis`, normal to the face.
-    fn holds_across(&self, axis: usize) -> bool {
-        match self {
-            Self::Free => false,
-            Self::Sliding | Self::Fixed => true,
-            Self::Held(components) => components.get(axis) == Some(&true),
-            Self::Displacement(table) | Self::Velocity(table) => {
-                table.0.iter().any(|row| row.1.get(axis).is_some_and(Option::is_some))
-            }
-            Self::Rotation(_) => true,
-        }
     }
 }

@@ -133,26 +133,21 @@ impl GridBox {
             if !problems.positive(&path, size) || !spacing_ok || self.cells_along(size).is_some() {
                 continue;
             }
-            let cells = size / self.spacing;
+            let (cells, spacing) = (size / self.spacing, Number(self.spacing));
             let allowed = if cells > MAX_CELLS {
-                format!(
-                    "at a spacing of {} it would take {cells:e} cells; at most {MAX_CELLS:e} are allowed",
-                    self.spacing
-                )
+                format!("at a spacing of {spacing} it would take {cells:e} cells; at most {MAX_CELLS:e} are allowed")
             } else {
-                let whole = cells.round().max(1.0) * self.spacing;
-                format!("must be a multiple of the spacing {}, such as {}", Number(self.spacing), Number(whole))
+                let whole = Number(cells.round().max(1.0) * self.spacing);
+                format!("must be a multiple of the spacing {spacing}, such as {whole}")
             };
             problems.refuse(&path, Number(size), allowed);
         }
-        let farthest = self.farthest();
+        let (farthest, spacing) = (self.farthest(), Number(self.spacing));
+        let allowed =
+            format!("numbers of that size are too coarse to tell nodes {spacing} apart; at most {farthest:e} in size");
         for (k, &x) in self.origin.iter().flatten().enumerate().filter(|_| spacing_ok) {
-            let allowed = format!(
-                "numbers of that size are too coarse to tell nodes {} apart; at most {farthest:e} in size",
-                Number(self.spacing)
-            );
             let far = sensible(x) && x.abs() > farthest;
-            problems.require(!far, &format!("grid.origin[{k}]"), Number(x), allowed);
+            problems.require(!far, &format!("grid.origin[{k}]"), Number(x), &allowed);
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Pictures (PNG, in 2D) and scans (raw voxels, in 3D) as shapes.
 
-use super::file::{ShapeFileError, open};
+use super::file::{FileError, ending, open};
 use super::vector::corners;
 use crate::problems::Problems;
 use crate::shape::{Mask, Pixels};
@@ -43,37 +43,26 @@ pub struct ImageFile {
 impl ImageFile {
     /// The solid; `None` if it is not allowed, with the reasons in `problems`, and before the file has been read.
     pub(super) fn build<const D: usize>(&self, problems: &mut Problems, path: &str) -> Option<Pixels<D>> {
-        let ending = match D {
-            2 => "png",
-            3 => "raw",
-            _ => {
-                problems.refuse(path, "an image", "needs a grid of 2 or 3 dimensions");
-                return None;
-            }
-        };
-        let found = self.file.extension().and_then(|ending| ending.to_str());
-        let named = found.is_some_and(|found| found.eq_ignore_ascii_case(ending));
-        let allowed = format!("must end in .{ending} in {D} dimensions");
+        if D < 2 {
+            problems.refuse(path, "an image", "needs a grid of 2 or 3 dimensions");
+            return None;
+        }
+        let format = if D == 2 { "png" } else { "raw" };
+        let allowed = format!("must end in .{format} in {D} dimensions");
+        let named = ending(&self.file) == format;
         problems.require(named, &format!("{path}.file"), format_args!("{:?}", self.file), allowed);
         let corners = corners::<D>(problems, path, &self.min, &self.max);
-        let [least, most] = self.values;
-        let values = format_args!("[{least}, {most}]");
-        problems.require(
-            least <= most,
-            &format!("{path}.values"),
-            values,
-            "must be the least value, then the greatest",
-        );
+        let ([least, most], allowed) = (self.values, "must be the least value, then the greatest");
+        problems.require(least <= most, &format!("{path}.values"), format_args!("[{least}, {most}]"), allowed);
         let path = format!("{path}.size");
         match self.size {
-            None => problems.require(D == 2, &path, "nothing", "must give the voxels along x, y and z"),
+            None => _ = problems.require(D == 2, &path, "nothing", "must give the voxels along x, y and z"),
             Some(size) if D == 2 => {
                 problems.refuse(&path, format_args!("{size:?}"), "must not be given: the picture knows its size");
             }
             Some(size) => {
                 let allowed = format!("must be three numbers of at least 1 whose product is at most {MAX_PIXELS}");
-                let all = product(&size).filter(|all| (1..=MAX_PIXELS).contains(all));
-                problems.require(all.is_some(), &path, format_args!("{size:?}"), allowed);
+                problems.require(pixels(&size).is_some(), &path, format_args!("{size:?}"), allowed);
             }
         }
         let [min, max] = corners?;
@@ -84,7 +73,7 @@ impl ImageFile {
     ///
     /// # Errors
     /// The file cannot be read, is of another kind or size, or has no pixel in the range of values.
-    pub(super) fn read(&self, folder: &Path) -> Result<(), ShapeFileError> {
+    pub(super) fn read(&self, folder: &Path) -> Result<(), FileError> {
         if self.read.get().is_some() {
             return Ok(());
         }
@@ -97,27 +86,27 @@ impl ImageFile {
         let inside = bytes.iter().map(|value| (least..=most).contains(value));
         let mask = Mask::new(count.map(|n| n as usize), inside).ok_or_else(|| {
             let (low, high) = bytes.iter().fold((u8::MAX, 0), |(low, high), &value| (low.min(value), high.max(value)));
-            ShapeFileError(format!(
-                "has no pixel of a value from {least} to {most}: its values are from {low} to {high}"
-            ))
+            FileError(format!("has no pixel of a value from {least} to {most}: its values are from {low} to {high}"))
         })?;
         let _ = self.read.set(mask);
         Ok(())
     }
 }
 
-fn product(size: &[u32]) -> Option<u64> {
-    size.iter().try_fold(1_u64, |all, &n| all.checked_mul(n.into()))
+/// The number of pixels, if it is allowed.
+fn pixels(size: &[u32]) -> Option<u64> {
+    let product = size.iter().try_fold(1_u64, |all, &n| all.checked_mul(n.into()));
+    product.filter(|pixels| (1..=MAX_PIXELS).contains(pixels))
 }
 
-fn wrong_length(found: u64, asked: u64) -> ShapeFileError {
-    ShapeFileError(format!("has {found} bytes, and {asked} pixels"))
+fn wrong_length(found: u64, asked: u64) -> FileError {
+    FileError(format!("has {found} bytes, and {asked} pixels"))
 }
 
 /// The voxels of a raw file.
-fn raw(mut file: BufReader<File>, size: &[u32; 3], found: u64) -> Result<Vec<u8>, ShapeFileError> {
-    let asked = product(size).unwrap_or(u64::MAX);
-    if found != asked || asked > MAX_PIXELS {
+fn raw(mut file: BufReader<File>, size: &[u32; 3], found: u64) -> Result<Vec<u8>, FileError> {
+    let asked = pixels(size).unwrap_or(u64::MAX);
+    if found != asked {
         return Err(wrong_length(found, asked));
     }
     let mut bytes = vec![0; asked as usize];
@@ -126,25 +115,23 @@ fn raw(mut file: BufReader<File>, size: &[u32; 3], found: u64) -> Result<Vec<u8>
 }
 
 /// The pixels of a PNG file, the last row first, so that y increases upwards.
-fn grey(file: BufReader<File>, found: u64) -> Result<([u32; 3], Vec<u8>), ShapeFileError> {
+fn grey(file: BufReader<File>, found: u64) -> Result<([u32; 3], Vec<u8>), FileError> {
     let mut decoder = png::Decoder::new(file);
     decoder.set_transformations(png::Transformations::EXPAND);
     let mut reader = decoder.read_info().map_err(io::Error::from)?;
     let info = reader.info();
     let (width, height) = info.size();
-    let kind = (info.color_type, info.bit_depth, info.trns.is_some());
-    if kind.0 != png::ColorType::Grayscale || kind.1 == png::BitDepth::Sixteen || kind.2 {
-        let transparent = if kind.2 { ", transparent" } else { "" };
-        return Err(ShapeFileError(format!(
-            "is a PNG of {:?} and {} bits{transparent}; grey ones of 1, 2, 4 or 8 bits are allowed, without transparency",
-            kind.0, kind.1 as u8
+    let (color, depth, transparent) = (info.color_type, info.bit_depth, info.trns.is_some());
+    if color != png::ColorType::Grayscale || depth == png::BitDepth::Sixteen || transparent {
+        let transparent = if transparent { ", transparent" } else { "" };
+        return Err(FileError(format!(
+            "is a PNG of {color:?} and {} bits{transparent}; grey ones of 1, 2, 4 or 8 bits are allowed, without transparency",
+            depth as u8
         )));
     }
-    let pixels = product(&[width, height]).filter(|pixels| (1..=MAX_PIXELS).contains(pixels));
-    let asked = pixels.ok_or_else(|| {
-        ShapeFileError(format!("has {width} × {height} pixels; 1 to {MAX_PIXELS} in all are allowed"))
-    })?;
-    if asked * kind.1 as u64 / 8 > MAX_COMPRESSION * found {
+    let asked = pixels(&[width, height])
+        .ok_or_else(|| FileError(format!("has {width} × {height} pixels; 1 to {MAX_PIXELS} in all are allowed")))?;
+    if asked * depth as u64 / 8 > MAX_COMPRESSION * found {
         return Err(wrong_length(found, asked));
     }
     let mut bytes = vec![0; asked as usize];

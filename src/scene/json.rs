@@ -1,57 +1,32 @@
 //! Text as JSON, with the place of an error.
 
 use super::place::{Step, path};
-use crate::problems::Place;
+use crate::problems::{Place, Problem};
 use serde::de::{self, Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
 use serde_json::{Map, Value};
 use serde_path_to_error::Segment;
-use std::fmt::{self, Display};
-
-/// Maximum characters of a path, about twice the longest path of a real scene.
-const PATH: usize = 160;
-
-/// Text that is not JSON, or does not have the types of a scene.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub struct Malformed {
-    /// The key, such as `bodies[0].density`; empty if the text is not JSON.
-    pub path: String,
-    /// Description of the error.
-    pub message: String,
-    /// Position of the error.
-    pub place: Option<Place>,
-    /// Further errors of this kind.
-    pub others: Vec<Malformed>,
-}
-
-impl Display for Malformed {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let separator = if self.path.is_empty() { "" } else { ": " };
-        // Nobody reads a path through a hundred brackets, so a long path is cut.
-        let path: String = self.path.chars().take(PATH).collect();
-        let more = if path.len() < self.path.len() { "…" } else { "" };
-        write!(f, "{path}{more}{separator}{}", self.message)?;
-        self.place.iter().try_for_each(|place| write!(f, "\n{place}"))?;
-        self.others.iter().try_for_each(|other| write!(f, "\n{other}"))
-    }
-}
+use std::fmt;
 
 /// Parses text as JSON; a duplicate key is an error.
-pub(super) fn parse(text: &str) -> Result<Value, Malformed> {
+pub(super) fn parse(text: &str) -> Result<Value, Problem> {
     let mut json = serde_json::Deserializer::from_str(text);
     let located = |path: String, error: &serde_json::Error| {
-        let place = Place::at_line(text, error.line(), error.column());
+        let offset = offset(text, error.line(), error.column());
         let full = error.to_string();
-        let bare = full.rfind(" at line ").and_then(|end| full.get(..end)).unwrap_or(&full);
-        let hint = match &place {
-            Place::Text { excerpt, indent, .. } => hint(&excerpt.chars().skip(*indent).collect::<String>()),
-            Place::Override(_) => "",
-        };
-        Malformed { path, message: format!("{bare}{hint}"), place: Some(place), others: Vec::new() }
+        let bare = full.rsplit_once(" at line ").map_or(full.as_str(), |(bare, _)| bare);
+        let message = format!("{bare}{}", hint(text.get(offset..).unwrap_or_default()));
+        Problem { path, message, place: Some(Place::at(text, offset)) }
     };
     let value: Unique = serde_path_to_error::deserialize(&mut json)
         .map_err(|error| located(path(&segments(error.path())), error.inner()))?;
     json.end().map_err(|error| located(String::new(), &error))?;
     Ok(value.0)
+}
+
+/// The offset of a line and byte column as counted by serde_json, both from 1 (column 0: before the line).
+fn offset(text: &str, line: usize, column: usize) -> usize {
+    let start: usize = text.split_inclusive('\n').take(line.saturating_sub(1)).map(str::len).sum();
+    start + column.saturating_sub(1)
 }
 
 /// A hint at a common mistake in JSON, by the text at the error.

@@ -3,9 +3,9 @@
 //! serde stops at the first key or type that does not fit. The schema then finds the others.
 
 use super::place::Step;
-use super::suggest::nearest;
 use serde_json::{Map, Value};
 use std::sync::LazyLock;
+use strsim::damerau_levenshtein;
 
 static SCHEMA: LazyLock<Value> = LazyLock::new(|| super::complete_schema().to_value());
 
@@ -67,13 +67,13 @@ fn types(schema: &Value) -> Vec<&str> {
 
 /// The alternatives of an enum by name: words, and objects with one key.
 fn variants(schema: &Value) -> Option<Vec<(&str, &Value)>> {
-    let list = schema["oneOf"].as_array()?;
-    Some(list.iter().filter_map(|one| Some((variant_name(one)?, one))).collect())
-}
-
-fn variant_name(one: &Value) -> Option<&str> {
-    let key = one["properties"].as_object().and_then(|keys| keys.keys().next());
-    one["const"].as_str().or(key.map(String::as_str))
+    let mut variants = Vec::new();
+    for variant in schema["oneOf"].as_array()? {
+        let key = variant["properties"].as_object().and_then(|keys| keys.keys().next());
+        let name = variant["const"].as_str().or(key.map(String::as_str));
+        variants.extend(name.map(|name| (name, variant)));
+    }
+    Some(variants)
 }
 
 /// A walk through a scene and its schema, side by side.
@@ -105,19 +105,19 @@ impl Audit {
         let most = if schema["format"] == "uint8" { u8::MAX.into() } else { u32::MAX.into() };
         match (types(schema).first().copied(), value) {
             (Some("object"), Value::Object(object)) => self.object(schema, object),
+            (Some("object"), _) => self.mismatch("an object", value),
             (Some("array"), Value::Array(list)) => {
                 for (i, value) in list.iter().enumerate() {
                     self.within(Step::Index(i), schema["prefixItems"].get(i).unwrap_or(&schema["items"]), value);
                 }
             }
-            (Some("object"), _) => self.mismatch("an object", value),
             (Some("array"), _) => self.mismatch("a list", value),
-            (Some("number"), value) if !value.is_number() => self.mismatch("a number", value),
-            (Some("integer"), value) if value.as_u64().is_none_or(|n| n > most) => {
+            (Some("number"), _) if !value.is_number() => self.mismatch("a number", value),
+            (Some("integer"), _) if value.as_u64().is_none_or(|n| n > most) => {
                 self.mismatch(&format!("a whole number from 0 to {most}"), value);
             }
-            (Some("string"), value) if !value.is_string() => self.mismatch("a string", value),
-            (Some("boolean"), value) if !value.is_boolean() => self.mismatch("true or false", value),
+            (Some("string"), _) if !value.is_string() => self.mismatch("a string", value),
+            (Some("boolean"), _) if !value.is_boolean() => self.mismatch("true or false", value),
             _ => {}
         }
     }
@@ -125,12 +125,11 @@ impl Audit {
     fn object(&mut self, schema: &Value, object: &Map<String, Value>) {
         let Some(known) = schema["properties"].as_object() else { return };
         for (key, value) in object {
-            let step = Step::Key(key.clone());
             match known.get(key) {
-                Some(schema) => self.within(step, schema, value),
+                Some(schema) => self.within(Step::Key(key.clone()), schema, value),
                 None => {
-                    self.steps.push(step);
-                    self.unknown("field", key, &known.keys().map(String::as_str).collect::<Vec<_>>());
+                    self.steps.push(Step::Key(key.clone()));
+                    self.unknown("field", key, known.keys().map(String::as_str).collect());
                     self.steps.pop();
                 }
             }
@@ -144,14 +143,16 @@ impl Audit {
     fn variant(&mut self, variants: &[(&str, &Value)], value: &Value) {
         let (word, inner) = match value {
             Value::String(word) => (word, None),
-            Value::Object(object) => match (object.iter().next(), object.len()) {
-                (Some((word, inner)), 1) => (word, Some(inner)),
-                _ => return self.mismatch("an object with exactly one key", value),
+            Value::Object(object) if object.len() != 1 => {
+                return self.mismatch("an object with exactly one key", value);
+            }
+            value => match value.as_object().and_then(|object| object.iter().next()) {
+                Some((word, inner)) => (word, Some(inner)),
+                None => return self.mismatch("a word or an object with one key", value),
             },
-            _ => return self.mismatch("a word or an object with one key", value),
         };
         let Some((_, variant)) = variants.iter().find(|(name, _)| name == word) else {
-            return self.unknown("variant", word, &variants.iter().map(|(name, _)| *name).collect::<Vec<_>>());
+            return self.unknown("variant", word, variants.iter().map(|(name, _)| *name).collect());
         };
         match (variant["properties"].get(word), inner) {
             (Some(schema), Some(inner)) => self.within(Step::Key(word.clone()), schema, inner),
@@ -161,10 +162,9 @@ impl Audit {
         }
     }
 
-    fn unknown(&mut self, kind: &str, word: &str, allowed: &[&str]) {
-        let meant = nearest(word, allowed).map_or_else(String::new, |meant| format!("; did you mean `{meant}`?"));
-        let allowed: Vec<String> = allowed.iter().map(|name| format!("`{name}`")).collect();
-        self.say(format!("unknown {kind} `{word}`, expected one of {}{meant}", allowed.join(", ")));
+    fn unknown(&mut self, kind: &str, word: &str, allowed: Vec<&str>) {
+        let meant = nearest(word, &allowed).map_or_else(String::new, |meant| format!("; did you mean `{meant}`?"));
+        self.say(format!("unknown {kind} `{word}`, expected one of `{}`{meant}", allowed.join("`, `")));
     }
 
     fn mismatch(&mut self, expected: &str, value: &Value) {
@@ -187,7 +187,9 @@ fn describe(schema: &Value, value: &Value, at: &str, keys: &mut Vec<Key>) {
     let variant = |word: &str| variants.iter().find(|(name, _)| *name == word).map(|(_, variant)| *variant);
     match value {
         Value::String(word) => {
-            variant(word).into_iter().for_each(|one| tell(format!("{at} = {word:?}"), one, keys));
+            if let Some(variant) = variant(word) {
+                tell(format!("{at} = {word:?}"), variant, keys);
+            }
         }
         Value::Object(object) => {
             for (key, value) in object {
@@ -197,9 +199,7 @@ fn describe(schema: &Value, value: &Value, at: &str, keys: &mut Vec<Key>) {
                 describe(property, value, &below(key), keys);
             }
         }
-        Value::Array(list) => {
-            list.iter().for_each(|value| describe(&schema["items"], value, &format!("{at}[]"), keys));
-        }
+        Value::Array(list) => list.iter().for_each(|value| describe(&schema["items"], value, &format!("{at}[]"), keys)),
         _ => {}
     }
 }
@@ -210,5 +210,37 @@ fn tell(path: String, schema: &Value, keys: &mut Vec<Key>) {
     let key = Key { path, about: about.split_whitespace().collect::<Vec<_>>().join(" ") };
     if !key.about.is_empty() && !keys.contains(&key) {
         keys.push(key);
+    }
+}
+
+/// Maximum number of letters to change, insert, drop or exchange with a neighbour.
+const MAX_EDITS: usize = 2;
+
+/// Maximum length of a word; no key is longer.
+const MAX_LETTERS: usize = 64;
+
+/// The word of `allowed` nearest to `word`, if it is at most two letters away and shares at least one.
+pub(super) fn nearest<'a>(word: &str, allowed: &[&'a str]) -> Option<&'a str> {
+    let letters = word.chars().count();
+    if letters > MAX_LETTERS {
+        return None;
+    }
+    allowed
+        .iter()
+        .map(|candidate| (damerau_levenshtein(word, candidate), *candidate))
+        .filter(|(edits, candidate)| *edits <= MAX_EDITS && *edits < letters.min(candidate.len()))
+        .min_by_key(|(edits, _)| *edits)
+        .map(|(_, candidate)| candidate)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_near_words_are_suggested() {
+        assert_eq!(nearest("sape", &["name", "shape"]), Some("shape"));
+        assert_eq!(nearest("mass", &["density", "velocity"]), None);
+        assert_eq!(nearest("of", &["by"]), None);
     }
 }

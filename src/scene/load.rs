@@ -2,8 +2,8 @@
 
 use super::body::Body;
 use super::curve::Curve;
+use super::keys::nearest;
 use super::shape::Shape;
-use super::suggest::nearest;
 use super::vector::check_normal;
 use crate::problems::Problems;
 use schemars::JsonSchema;

@@ -21,7 +21,6 @@ pub mod time;
 pub mod transfer;
 
 mod build;
-mod build_error;
 mod file;
 mod filling;
 mod json;
@@ -29,13 +28,12 @@ mod loading;
 mod overrides;
 mod place;
 mod read;
-mod suggest;
 mod vector;
 mod warnings;
 
 pub use crate::problems::{Place, Problem, Problems};
-pub use build_error::BuildError;
-pub use file::ShapeFileError;
+pub use build::BuildError;
+pub use file::FileError;
 pub use filling::BodyUse;
 pub use overrides::{Override, OverrideError};
 pub use read::{MAX_BYTES, SceneError, read, read_file};
@@ -43,11 +41,11 @@ pub use read::{MAX_BYTES, SceneError, read, read_file};
 use crate::approximation;
 use crate::field::Field;
 use crate::material::{Law, Material, PLASTIC_STRAIN};
-use crate::mechanics::loads::Loads;
 use crate::mechanics::loads::Rayleigh;
 use crate::mechanics::reference::GridReset;
 use crate::mechanics::schemes::{LONG_STEPS, Parameters};
 use crate::shape::Layout;
+use crate::simulation::InitialGuess;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
@@ -57,6 +55,12 @@ const STATIC_STRAIN: f64 = 1.0;
 
 /// The strain up to which a clamped body keeps its grid with inertia. The cantilever of `docs/src/choosing.md` loses 0.01 % of its energy.
 const VIBRATION_STRAIN: f64 = 0.1;
+
+/// Keys that have a meaning only with inertia.
+const OF_INERTIA: [&str; 3] = ["transfer", "initial_velocity", "damping"];
+
+/// Keys of `time` that have a meaning only with inertia.
+const TIME_OF_INERTIA: [&str; 6] = ["beta", "gamma", "lumping", "projection", "wall_update", "adaptive"];
 
 /// A body that comes this near to a face of the box, in spacings, touches it.
 const TOUCHES: f64 = 1e-9;
@@ -173,6 +177,11 @@ fn complete_schema() -> schemars::Schema {
     schemars::schema_for!(Scene)
 }
 
+/// The default of a key.
+fn default_number<const N: u32>() -> u32 {
+    N
+}
+
 impl Scene {
     /// All values of the scene that are not allowed, in the order of its sections.
     ///
@@ -224,8 +233,10 @@ impl Scene {
     /// has more of a loaded surface than of the particles below. Adaptive steps become short at impacts.
     fn aggregates(&self) -> bool {
         let computed = self.surface_loads().any(|(_, load)| load.surface.is_none());
-        let long_steps = self.time.adaptive.is_none() && self.courant() > LONG_STEPS;
-        let consistent = self.time.scheme().has_inertia() && self.time.lumping() == 0.0;
+        let has_inertia = self.time.scheme().has_inertia();
+        let courant = || accuracy::courant(&self.bodies, self.grid.spacing, self.time.step).unwrap_or(0.0);
+        let long_steps = self.time.adaptive.is_none() && (!has_inertia || courant() > LONG_STEPS);
+        let consistent = has_inertia && self.time.lumping() == 0.0;
         let needed = long_steps || consistent || computed;
         self.aggregation.or(self.ghost_stiffness.map(|factor| factor > 0.0)).unwrap_or(needed)
     }
@@ -243,31 +254,15 @@ impl Scene {
 
     /// Whether the scene has one body, and its shape reaches a fixed face of the box.
     fn is_clamped(&self) -> bool {
-        match self.dimension() {
-            1 => self.reaches_fixed_face::<1>(),
-            2 => self.reaches_fixed_face::<2>(),
-            _ => self.reaches_fixed_face::<3>(),
-        }
-    }
-
-    fn reaches_fixed_face<const D: usize>(&self) -> bool {
         let [body] = self.bodies.as_slice() else { return false };
-        let Some(shape) = body.shape.as_ref().and_then(shape::Shape::build::<D>) else { return false };
-        let (lower, upper) = shape.bounding_box();
-        let (origin, size) = (self.grid.origin(), &self.grid.size);
-        let near = TOUCHES * self.grid.spacing;
-        (0..D).any(|k| {
-            let fixed = |is_upper: bool| *self.boundary.face(k, is_upper) == boundary::Face::Fixed;
-            (fixed(false) && lower[k] < origin[k] + near) || (fixed(true) && upper[k] > origin[k] + size[k] - near)
+        let bounds = body.shape.as_ref().and_then(|shape| shape.check(&mut Problems::default(), "", self.dimension()));
+        let Some([lower, upper]) = bounds else { return false };
+        let (origin, near) = (self.grid.origin(), TOUCHES * self.grid.spacing);
+        (0..self.dimension()).any(|k| {
+            let is_fixed = |upper| *self.boundary.face(k, upper) == boundary::Face::Fixed;
+            let far_end = origin[k] + self.grid.size[k];
+            (is_fixed(false) && lower[k] < origin[k] + near) || (is_fixed(true) && upper[k] > far_end - near)
         })
-    }
-
-    /// The largest Courant number of pressure waves; infinite without inertia.
-    fn courant(&self) -> f64 {
-        if !self.time.scheme().has_inertia() {
-            return f64::INFINITY;
-        }
-        accuracy::courant(&self.bodies, self.grid.spacing, self.time.step).unwrap_or(0.0)
     }
 
     /// The fields of a snapshot.
@@ -295,38 +290,32 @@ impl Scene {
         self.bodies.iter().filter_map(|body| body.material.law(&mut Problems::default(), ""))
     }
 
-    /// The loads that depend neither on the grid nor on the particles.
-    fn given_as_they_are<const D: usize>(&self) -> Loads<D> {
-        Loads { damping: self.damping, ..Loads::default() }
-    }
-
     /// The cause of an unsymmetric tangent; `None` if the tangent is symmetric.
     fn unsymmetric(&self) -> Option<&'static str> {
-        if !self.pressures.is_empty() {
-            Some("pressures make")
-        } else if self.laws().any(|law| !law.is_symmetric()) {
-            Some("a law with friction makes")
-        } else {
-            None
-        }
+        let has_friction = self.laws().any(|law| !law.is_symmetric());
+        let friction = has_friction.then_some("a law with friction makes");
+        if self.pressures.is_empty() { friction } else { Some("pressures make") }
     }
 
     /// Refuses keys that have a meaning only with inertia.
     fn refuse_inertia(&self, problems: &mut Problems) {
-        let mut refuse = |path: &str, value: &str| {
-            let scheme = time::word(self.time.scheme());
-            let allowed =
-                format!("time.scheme is {scheme}, and without inertia it means nothing: remove one of the two");
-            problems.refuse(path, value, allowed);
-        };
-        self.time.of_inertia().for_each(|(path, value)| refuse(path, &value));
-        self.transfer.iter().for_each(|transfer| refuse("transfer", &time::word(transfer)));
-        for (i, velocity) in self.bodies.iter().enumerate().filter_map(|(i, body)| Some((i, body.velocity.as_ref()?))) {
-            refuse(&format!("bodies[{i}].velocity"), &time::word(velocity));
+        let scheme = time::word(self.time.scheme());
+        let allowed = format!("time.scheme is {scheme}, and without inertia it means nothing: remove one of the two");
+        let given = serde_json::to_value(self).unwrap_or_default();
+        let of_time = TIME_OF_INERTIA.map(|key| (format!("time.{key}"), &given["time"][key]));
+        let others = OF_INERTIA.map(|key| (key.to_owned(), &given[key]));
+        for (key, value) in of_time.into_iter().chain(others).filter(|(_, value)| !value.is_null()) {
+            problems.refuse(&key, value, &allowed);
         }
-        self.initial_velocity.iter().for_each(|_| refuse("initial_velocity", "a velocity"));
-        self.damping.iter().for_each(|_| refuse("damping", "a damping"));
-        self.output.of_inertia().for_each(|(path, value)| refuse(&path, &value));
+        if self.time.initial_guess == Some(InitialGuess::Velocity) {
+            problems.refuse("time.initial_guess", "\"velocity\"", &allowed);
+        }
+        for (i, velocity) in self.bodies.iter().enumerate().filter_map(|(i, body)| Some((i, body.velocity.as_ref()?))) {
+            problems.refuse(&format!("bodies[{i}].velocity"), time::word(velocity), &allowed);
+        }
+        for (path, field) in self.output.asked().into_iter().filter(|(_, field)| field.needs_inertia()) {
+            problems.refuse(&path, time::word(field), &allowed);
+        }
     }
 
     /// Refuses features that the arc-length method cannot have: follower pressures, prescribed motion, and a grid reset in every step.
@@ -335,18 +324,16 @@ impl Scene {
         for i in 0..self.pressures.len() {
             problems.refuse(&format!("pressures[{i}]"), "a follower pressure", allowed);
         }
-        let faces = self.boundary.faces().into_iter().filter_map(|(name, face)| Some((name, face?)));
-        for (name, _) in faces.filter(|(_, face)| face.driving().is_some_and(boundary::Driving::moves)) {
-            problems.refuse(&format!("boundary.{name}"), "a motion", allowed);
+        for (name, face) in self.boundary.faces() {
+            let moves = face.is_some_and(boundary::Face::moves);
+            problems.require(!moves, &format!("boundary.{name}"), "a motion", allowed);
         }
         for (i, prescribed) in self.prescribed.iter().enumerate() {
-            if prescribed.given().any(boundary::Driving::moves) {
-                problems.refuse(&format!("prescribed[{i}]"), "a motion", allowed);
-            }
+            let moves = prescribed.given().iter().any(|(_, motion)| motion.moves());
+            problems.require(!moves, &format!("prescribed[{i}]"), "a motion", allowed);
         }
-        if self.grid.given_reset() == Some(GridReset::EveryStep) {
-            problems.refuse("grid.reset", "\"every_step\"", allowed);
-        }
+        let kept = self.grid.given_reset() != Some(GridReset::EveryStep);
+        problems.require(kept, "grid.reset", "\"every_step\"", allowed);
     }
 
     /// Fills in defaults that depend on other keys, for all keys that have a meaning in this scene.
@@ -378,16 +365,13 @@ impl Scene {
     }
 
     fn check_initial_velocity(&self, initial: &InitialVelocity, problems: &mut Problems, dimension: usize) {
-        let regions = &initial.nodes;
         let path = "initial_velocity.nodes";
-        problems.require(!regions.is_empty(), path, "an empty list", "must have at least one region");
-        for (i, body) in self.bodies.iter().enumerate() {
-            if let Some(velocity) = &body.velocity {
-                let allowed = "initial_velocity gives the velocity of all particles: remove one of the two";
-                problems.refuse(&format!("bodies[{i}].velocity"), format_args!("{velocity:?}"), allowed);
-            }
+        problems.require(!initial.nodes.is_empty(), path, "an empty list", "must have at least one region");
+        for (i, velocity) in self.bodies.iter().enumerate().filter_map(|(i, body)| Some((i, body.velocity.as_ref()?))) {
+            let allowed = "initial_velocity gives the velocity of all particles: remove one of the two";
+            problems.refuse(&format!("bodies[{i}].velocity"), format_args!("{velocity:?}"), allowed);
         }
-        for (i, node) in problems.few(path, regions).iter().enumerate() {
+        for (i, node) in problems.few(path, &initial.nodes).iter().enumerate() {
             node.region.check(problems, &format!("{path}[{i}].region"), dimension);
             problems.vector(&format!("{path}[{i}].velocity"), &node.velocity, dimension);
         }
@@ -395,20 +379,19 @@ impl Scene {
 
     fn check_bodies(&self, problems: &mut Problems) {
         problems.require(!self.bodies.is_empty(), "bodies", "an empty list", "must have at least one body");
-        let (family, agree) = (self.approximation.key(), self.approximation.one_half_width());
+        let agree = self.approximation.one_half_width();
+        let because = format!("{} has one half width for all particles", self.approximation.key());
         for (i, body) in problems.few("bodies", &self.bodies).iter().enumerate() {
             let path = format!("bodies[{i}]");
             body.check(problems, &path, &self.grid);
             let again = self.bodies.iter().take(i).any(|earlier| earlier.name == body.name);
             let allowed = "must differ from the names of the bodies before";
             problems.require(!again, &format!("{path}.name"), format_args!("{:?}", body.name), allowed);
-            let first = self.bodies.first().map_or(body.particles_per_cell, |first| first.particles_per_cell);
-            let found = body.particles_per_cell;
-            let allowed =
-                format!("must be {first} as in the first body: {family} has one half width for all particles");
+            let (found, first) = (body.particles_per_cell, self.bodies[0].particles_per_cell);
+            let allowed = format!("must be {first} as in the first body: {because}");
             problems.require(!agree || found == first, &format!("{path}.particles_per_cell"), found, allowed);
             let gauss = agree && body.layout == Some(Layout::Gauss);
-            let allowed = format!("must be \"regular\": {family} has one half width for all particles");
+            let allowed = format!("must be \"regular\": {because}");
             problems.require(!gauss, &format!("{path}.layout"), "\"gauss\"", allowed);
         }
     }

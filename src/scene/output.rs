@@ -3,7 +3,6 @@
 use super::body::Body;
 use super::grid::GridBox;
 use super::load::check_body;
-use super::time::word;
 use crate::field::Field;
 use crate::problems::Problems;
 use schemars::JsonSchema;
@@ -69,30 +68,24 @@ impl Output {
         })
     }
 
-    /// The given keys that have a meaning only with inertia, with their values.
-    pub(super) fn of_inertia(&self) -> impl Iterator<Item = (String, String)> {
-        let fields = self.fields.iter().flatten().enumerate().map(|(i, &field)| (format!("output.fields[{i}]"), field));
-        let probes =
-            self.probes.iter().enumerate().map(|(i, probe)| (format!("output.probes[{i}].field"), probe.field));
-        fields.chain(probes).filter(|(_, field)| field.needs_inertia()).map(|(key, field)| (key, word(field)))
+    /// The fields of snapshots and probes, with their keys.
+    pub(super) fn asked(&self) -> Vec<(String, Field)> {
+        let fields = self.fields.iter().flatten().enumerate().map(|(i, field)| (format!("output.fields[{i}]"), *field));
+        let probes = self.probes.iter().enumerate();
+        fields.chain(probes.map(|(i, probe)| (format!("output.probes[{i}].field"), probe.field))).collect()
     }
 
     pub(super) fn check(&self, problems: &mut Problems, bodies: &[Body], grid: &GridBox) {
-        if let Some(every) = self.every {
-            problems.positive("output.every", every);
-        }
-        if let Some(checkpoint) = self.checkpoint {
-            problems.positive("output.checkpoint", checkpoint);
+        for (path, interval) in [("output.every", self.every), ("output.checkpoint", self.checkpoint)] {
+            if let Some(interval) = interval {
+                problems.positive(path, interval);
+            }
         }
         let fields = self.fields.as_deref().unwrap_or_default();
         for (i, field) in problems.few("output.fields", fields).iter().enumerate() {
             let again = fields.iter().take(i).any(|earlier| earlier == field);
-            problems.require(
-                !again,
-                &format!("output.fields[{i}]"),
-                format_args!("{}, given before,", field.name()),
-                "must be listed once",
-            );
+            let found = format_args!("{}, given before,", field.name());
+            problems.require(!again, &format!("output.fields[{i}]"), found, "must be listed once");
         }
         let mut columns = HashSet::from(["time".to_owned()]);
         for (i, probe) in problems.few("output.probes", &self.probes).iter().enumerate() {
@@ -102,11 +95,9 @@ impl Output {
             let allowed = "must differ from the names of the probes before";
             problems.require(!again, &path, format_args!("{:?}", probe.name), allowed);
             for column in probe.field.columns(&probe.name, grid.dimension()) {
-                if !again && columns.contains(&column) {
-                    let allowed = format!("probes.csv already has a column {column:?}: choose another name");
-                    problems.refuse(&path, format_args!("{:?}", probe.name), allowed);
-                }
-                columns.insert(column);
+                let allowed = format!("probes.csv already has a column {column:?}: choose another name");
+                let is_new = columns.insert(column);
+                problems.require(again || is_new, &path, format_args!("{:?}", probe.name), allowed);
             }
         }
     }

@@ -35,9 +35,8 @@ impl FromStr for Override {
 
     fn from_str(argument: &str) -> Result<Self, OverrideError> {
         let form = || {
-            OverrideError(format!(
-                "the override {argument:?} is not allowed; must read KEY.PATH=JSON, such as time.step=0.01 or bodies.0.density=3"
-            ))
+            let form = "must read KEY.PATH=JSON, such as time.step=0.01 or bodies.0.density=3";
+            OverrideError(format!("the override {argument:?} is not allowed; {form}"))
         };
         let (key, text) = argument.split_once('=').ok_or_else(form)?;
         let steps = Some(key.trim()).filter(|key| is_path(key)).map(steps);
@@ -73,32 +72,36 @@ impl Override {
     pub(super) fn apply(&self, scene: &mut Value) -> Result<(), OverrideError> {
         let mut here = scene;
         for (i, step) in self.steps.iter().enumerate() {
-            let wrong = |message: String| {
-                let at = self.steps.get(..i).map(path).filter(|at| !at.is_empty()).unwrap_or("the scene".into());
+            here = next(here, step).map_err(|message| {
+                let at = if i == 0 { "the scene".to_owned() } else { path(&self.steps[..i]) };
                 OverrideError(format!("the override {:?} leads nowhere: {at} {message}", self.argument))
-            };
-            if here.is_null() && matches!(step, Step::Key(_)) {
-                *here = Value::Object(serde_json::Map::new());
-            }
-            here = match (here, step) {
-                (Value::Object(object), Step::Key(key)) => object.entry(key.as_str()).or_insert(Value::Null),
-                (Value::Array(list), Step::Index(index)) => {
-                    let entries = list.len();
-                    list.get_mut(*index).ok_or_else(|| {
-                        wrong(format!("has {entries} entries, counted from 0; {index} is not one of them"))
-                    })?
-                }
-                (Value::Array(list), Step::Key(key)) => {
-                    return Err(wrong(format!("is a list of {} entries; it takes a number, not {key:?}", list.len())));
-                }
-                (Value::Object(_), Step::Index(index)) => {
-                    return Err(wrong(format!("is an object; it takes a key, not the number {index}")));
-                }
-                (value, _) => return Err(wrong(format!("is {}, which has no keys", kind(value)))),
-            };
+            })?;
         }
         *here = self.value.clone();
         Ok(())
+    }
+}
+
+/// The value to which a step leads; an absent one is created. Or the reason why there is none.
+pub(super) fn next<'a>(value: &'a mut Value, step: &Step) -> Result<&'a mut Value, String> {
+    if value.is_null() && matches!(step, Step::Key(_)) {
+        *value = Value::Object(serde_json::Map::new());
+    }
+    match (value, step) {
+        (Value::Object(object), Step::Key(key)) => Ok(object.entry(key.as_str()).or_insert(Value::Null)),
+        (Value::Array(list), Step::Index(index)) => {
+            let entries = list.len();
+            let next = list.get_mut(*index);
+            next.ok_or_else(|| format!("has {entries} entries, counted from 0; {index} is not one of them"))
+        }
+        (Value::Array(list), Step::Key(key)) => {
+            Err(format!("is a list of {} entries; it takes a number, not {key:?}", list.len()))
+        }
+        (Value::Object(_), Step::Index(index)) => Err(format!("is an object; it takes a key, not the number {index}")),
+        (Value::Null, _) => Err("is null, which has no keys".to_owned()),
+        (Value::Bool(_), _) => Err("is true or false, which has no keys".to_owned()),
+        (Value::Number(_), _) => Err("is a number, which has no keys".to_owned()),
+        (Value::String(_), _) => Err("is a string, which has no keys".to_owned()),
     }
 }
 
@@ -117,15 +120,4 @@ fn is_word(text: &str) -> bool {
     let mut letters = text.chars();
     letters.next().is_some_and(|c| c.is_ascii_alphabetic() || c == '_')
         && letters.all(|c| c.is_ascii_alphanumeric() || "_-./ ".contains(c))
-}
-
-fn kind(value: &Value) -> &'static str {
-    match value {
-        Value::Null => "null",
-        Value::Bool(_) => "true or false",
-        Value::Number(_) => "a number",
-        Value::String(_) => "a string",
-        Value::Array(_) => "a list",
-        Value::Object(_) => "an object",
-    }
 }

@@ -1,9 +1,9 @@
 //! Particles from a CSV file: `x[,y[,z]],volume[,vx[,vy[,vz]]]`.
 
+use super::file::FileError;
 use crate::tensor::Vector;
-use std::fmt::Display;
 use std::fs::File;
-use std::io::{self, BufRead, BufReader, Read};
+use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
 /// Maximum number of particles in one file.
@@ -26,21 +26,6 @@ pub struct FileParticles<const D: usize> {
     pub velocities: Option<Vec<Vector<f64, D>>>,
 }
 
-/// A particle file that cannot be used: the line, and what is wrong there. Lines and columns are counted from 1.
-#[derive(Debug, thiserror::Error)]
-#[error("{0}")]
-pub struct ParticleFileError(String);
-
-impl ParticleFileError {
-    fn in_line(line: usize, what: impl Display) -> Self {
-        Self(format!("line {line}: {what}"))
-    }
-}
-
-fn unreadable(line: usize) -> impl Fn(io::Error) -> ParticleFileError {
-    move |source| ParticleFileError::in_line(line, format_args!("cannot be read: {source}"))
-}
-
 /// Reads the particle file at `path`.
 ///
 /// ```
@@ -57,9 +42,8 @@ fn unreadable(line: usize) -> impl Fn(io::Error) -> ParticleFileError {
 ///
 /// # Errors
 /// The first wrong line, and the wrong column in that line.
-pub fn read_file<const D: usize>(path: &Path) -> Result<FileParticles<D>, ParticleFileError> {
-    let file = File::open(path).map_err(unreadable(1))?;
-    read(BufReader::new(file))
+pub fn read_file<const D: usize>(path: &Path) -> Result<FileParticles<D>, FileError> {
+    read(BufReader::new(File::open(path)?))
 }
 
 /// Reads particles from CSV text; blank lines are skipped.
@@ -77,93 +61,73 @@ pub fn read_file<const D: usize>(path: &Path) -> Result<FileParticles<D>, Partic
 ///
 /// # Errors
 /// The first wrong line, and the wrong column in that line.
-pub fn read<const D: usize>(text: impl BufRead) -> Result<FileParticles<D>, ParticleFileError> {
-    let mut lines = Lines { text, line: 0 };
-    let header = lines.next_line()?.unwrap_or_default();
-    let header = header.trim_start_matches('\u{feff}');
-    let plain: Vec<&'static str> = AXES.into_iter().take(D).chain(["volume"]).collect();
-    let moving: Vec<&'static str> = plain.iter().copied().chain(VELOCITIES.into_iter().take(D)).collect();
-    let found: Vec<&str> = header.split(',').map(str::trim).collect();
-    let names = if found == moving {
-        moving
-    } else if found == plain {
-        plain
-    } else {
-        let (expected, with_velocity) = (plain.join(","), moving.join(","));
-        let found = shortened(header);
-        let what = format!("the header {found:?} is not allowed; must be {expected:?} or {with_velocity:?}");
-        return Err(ParticleFileError::in_line(1, what));
-    };
-
+pub fn read<const D: usize>(mut text: impl BufRead) -> Result<FileParticles<D>, FileError> {
     let mut particles = FileParticles { positions: Vec::new(), volumes: Vec::new(), velocities: None };
-    let mut velocities = Vec::new();
-    while let Some(text) = lines.next_line()? {
-        let line = lines.line;
-        if text.trim().is_empty() {
+    let (mut names, mut velocities) = (Vec::new(), Vec::new());
+    for line in 1.. {
+        let fail = |what: String| FileError(format!("line {line}{what}"));
+        let mut row = String::new();
+        let length = text.by_ref().take(MAX_LINE + 1).read_line(&mut row);
+        let length = length.map_err(|error| fail(format!(": cannot be read: {error}")))?;
+        if length as u64 > MAX_LINE {
+            return Err(fail(format!(": is longer than {MAX_LINE} bytes")));
+        }
+        if line == 1 {
+            names = columns::<D>(&row).map_err(fail)?;
+            continue;
+        }
+        if length == 0 {
+            break;
+        }
+        if row.trim().is_empty() {
             continue;
         }
         if particles.volumes.len() == MAX_PARTICLES {
-            return Err(ParticleFileError::in_line(line, format_args!("more than {MAX_PARTICLES} particles")));
+            return Err(fail(format!(": more than {MAX_PARTICLES} particles")));
         }
-        let found = text.split(',').count();
-        if found != names.len() {
-            let expected = names.len();
-            let what = format!("{found} columns are not allowed; must be {expected}, as in the header");
-            return Err(ParticleFileError::in_line(line, what));
-        }
-        let mut row = [0.0; 7];
-        for (column, ((value, name), word)) in row.iter_mut().zip(&names).zip(text.split(',')).enumerate() {
-            *value = number(word, line, column + 1, name)?;
-        }
-        particles.positions.push(Vector::from_fn(|k, _| row[k]));
-        particles.volumes.push(row[D]);
-        velocities.push(Vector::from_fn(|k, _| row[D + 1 + k]));
+        let values = numbers(&row, &names).map_err(fail)?;
+        particles.positions.push(Vector::from_fn(|k, _| values[k]));
+        particles.volumes.push(values[D]);
+        velocities.push(Vector::from_fn(|k, _| values[D + 1 + k]));
     }
     if particles.volumes.is_empty() {
-        return Err(ParticleFileError("the file has no particles".to_owned()));
+        return Err(FileError("the file has no particles".to_owned()));
     }
     particles.velocities = (names.len() > D + 1).then_some(velocities);
     Ok(particles)
 }
 
-fn number(word: &str, line: usize, column: usize, name: &'static str) -> Result<f64, ParticleFileError> {
-    let word = word.trim();
-    let volume = name == "volume";
-    match word.parse::<f64>() {
-        Ok(x) if x.abs() <= 1e100 && (!volume || x > 0.0) => Ok(x),
-        _ => {
-            let allowed = if volume { "a finite number > 0" } else { "a finite number, at most 1e100 in size" };
-            let found = shortened(word);
-            let place = format!("line {line}, column {column} ({name})");
-            Err(ParticleFileError(format!("{place}: {found:?} is not allowed; must be {allowed}")))
-        }
+/// The names of the columns, from the header. An error continues "line 1".
+fn columns<const D: usize>(header: &str) -> Result<Vec<&'static str>, String> {
+    let header = header.trim_start_matches('\u{feff}');
+    let plain: Vec<&'static str> = AXES.into_iter().take(D).chain(["volume"]).collect();
+    let moving: Vec<&'static str> = plain.iter().copied().chain(VELOCITIES.into_iter().take(D)).collect();
+    let found: Vec<&str> = header.split(',').map(str::trim).collect();
+    let allowed = format!("must be {:?} or {:?}", plain.join(","), moving.join(","));
+    let names = [plain, moving].into_iter().find(|names| *names == found);
+    names.ok_or_else(|| format!(": the header {:?} is not allowed; {allowed}", shortened(header)))
+}
+
+/// The numbers of a row, one for each column. An error continues "line 7".
+fn numbers(row: &str, names: &[&str]) -> Result<[f64; 7], String> {
+    let (found, expected) = (row.split(',').count(), names.len());
+    if found != expected {
+        return Err(format!(": {found} columns are not allowed; must be {expected}, as in the header"));
     }
+    let mut numbers = [0.0; 7];
+    for (i, ((number, name), word)) in numbers.iter_mut().zip(names).zip(row.split(',')).enumerate() {
+        let (word, is_volume) = (word.trim(), *name == "volume");
+        let parsed = word.parse().ok().filter(|x: &f64| x.abs() <= 1e100 && (!is_volume || *x > 0.0));
+        *number = parsed.ok_or_else(|| {
+            let allowed = if is_volume { "a finite number > 0" } else { "a finite number, at most 1e100 in size" };
+            format!(", column {} ({name}): {:?} is not allowed; must be {allowed}", i + 1, shortened(word))
+        })?;
+    }
+    Ok(numbers)
 }
 
 fn shortened(text: &str) -> String {
     text.trim_end().chars().take(80).collect()
-}
-
-/// Reads lines of bounded length, and counts them.
-struct Lines<R> {
-    text: R,
-    line: usize,
-}
-
-impl<R: BufRead> Lines<R> {
-    fn next_line(&mut self) -> Result<Option<String>, ParticleFileError> {
-        self.line += 1;
-        let line = self.line;
-        let mut text = String::new();
-        let read = self.text.by_ref().take(MAX_LINE + 1).read_line(&mut text);
-        match read.map_err(unreadable(line))? {
-            0 => Ok(None),
-            length if length as u64 > MAX_LINE => {
-                Err(ParticleFileError::in_line(line, format_args!("is longer than {MAX_LINE} bytes")))
-            }
-            _ => Ok(Some(text)),
-        }
-    }
 }
 
 #[cfg(test)]

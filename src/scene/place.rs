@@ -1,10 +1,8 @@
 //! Positions of keys and values in the text of a scene.
 
 use crate::problems::Place;
-use serde::de::{MapAccess, Visitor};
-use serde::{Deserialize, Deserializer};
 use serde_json::value::RawValue;
-use std::fmt;
+use std::collections::HashMap;
 
 /// Characters of the line shown on each side of the caret.
 const CONTEXT: usize = 60;
@@ -29,12 +27,6 @@ impl Place {
             excerpt: excerpt.map(|c| if c.is_control() { ' ' } else { c }).collect(),
             indent: shown.len(),
         }
-    }
-
-    /// The place of a line and byte column as counted by serde_json, both from 1 (column 0: before the line).
-    pub(super) fn at_line(text: &str, line: usize, column: usize) -> Self {
-        let start: usize = text.split_inclusive('\n').take(line.saturating_sub(1)).map(str::len).sum();
-        Self::at(text, start + column.saturating_sub(1))
     }
 }
 
@@ -82,7 +74,7 @@ pub(super) fn locate(text: &str, steps: &[Step]) -> Option<(usize, usize)> {
     found
 }
 
-/// The name of an entry of an object or a list, and its value. An entry of a list has its value for a name.
+/// The text from the name of an entry of an object or a list on, and its value. An entry of a list has its value for a name.
 fn entry<'a>(json: &'a str, step: &Step) -> Option<(&'a str, &'a str)> {
     match step {
         Step::Index(index) => {
@@ -90,37 +82,14 @@ fn entry<'a>(json: &'a str, step: &Step) -> Option<(&'a str, &'a str)> {
             list.get(*index).map(|value| (value.get(), value.get()))
         }
         Step::Key(key) => {
-            let quoted = format!("\"{key}\"");
-            let Entries(entries) = serde_json::from_str(json).ok()?;
-            entries.iter().map(|(name, value)| (name.get(), value.get())).find(|(name, _)| *name == quoted)
+            let object: HashMap<String, &RawValue> = serde_json::from_str(json).ok()?;
+            let value = object.get(key)?.get();
+            // The value borrows from the text, and its name stands before it.
+            let before = json.get(..value.as_ptr().addr() - json.as_ptr().addr())?;
+            let before = before.trim_end().strip_suffix(':')?.trim_end();
+            let name = before.strip_suffix(&format!("\"{key}\""))?.len();
+            Some((json.get(name..)?, value))
         }
-    }
-}
-
-/// The entries of an object as they are written.
-struct Entries<'a>(Vec<(&'a RawValue, &'a RawValue)>);
-
-impl<'de> Deserialize<'de> for Entries<'de> {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_map(EntriesVisitor)
-    }
-}
-
-struct EntriesVisitor;
-
-impl<'de> Visitor<'de> for EntriesVisitor {
-    type Value = Entries<'de>;
-
-    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("an object")
-    }
-
-    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Entries<'de>, A::Error> {
-        let mut entries = Vec::new();
-        while let Some(entry) = map.next_entry()? {
-            entries.push(entry);
-        }
-        Ok(Entries(entries))
     }
 }
 
@@ -128,7 +97,7 @@ impl<'de> Visitor<'de> for EntriesVisitor {
 mod tests {
     use super::*;
 
-    const TEXT: &str = "{\"a\": [1, {\"x\": \"}\\\"\", \"y\": 2}],\n\t\"b\": {\"c\": [[], [3.5e1, null]]}}";
+    const TEXT: &str = "{\"a\": [1, {\"x\": \"}{\\\"\", \"y\": 2}],\n\t\"b\": {\"c\": [[], [3.5e1, null]]}}";
 
     #[test]
     fn a_key_is_found_behind_strings_and_nested_lists() {

@@ -1,10 +1,10 @@
 //! Reads text into a checked scene.
 
-use super::json::{Malformed, parse, segments};
+use super::json::{parse, segments};
 use super::overrides::{Override, OverrideError};
 use super::place::{Step, locate, path, steps};
 use super::{Scene, accuracy, keys};
-use crate::problems::{KEPT, Place, Problems};
+use crate::problems::{KEPT, Place, Problem, Problems};
 use serde_json::Value;
 use std::fs::File;
 use std::io::Read;
@@ -28,11 +28,8 @@ pub enum SceneError {
         source: std::io::Error,
     },
     /// The text is too long.
-    #[error(
-        "the scene{} is longer than {MAX_BYTES} bytes, the most that is read; give many particles in a CSV file",
-        .0.map_or(String::new(), |found| format!(", of {found} bytes,"))
-    )]
-    TooLong(Option<u64>),
+    #[error("the scene has {0} bytes or more, and at most {MAX_BYTES} are read; give many particles in a CSV file")]
+    TooLong(u64),
     /// The text is not UTF-8.
     #[error("the scene is not UTF-8 text: byte {byte}, in line {line}, cannot be read")]
     NotText {
@@ -41,9 +38,9 @@ pub enum SceneError {
         /// Line of the invalid byte, from 1.
         line: usize,
     },
-    /// The text is not JSON, or has a key or type that a scene does not have.
-    #[error(transparent)]
-    Malformed(#[from] Malformed),
+    /// The text is not JSON, or has keys or types that a scene does not have.
+    #[error("{0}")]
+    Malformed(Problems),
     /// An override cannot be applied.
     #[error(transparent)]
     Override(#[from] OverrideError),
@@ -67,22 +64,17 @@ pub enum SceneError {
 /// The errors of [`read`], and a file that cannot be read or is not UTF-8.
 pub fn read_file(path: &Path, overrides: &[Override]) -> Result<Scene, SceneError> {
     let failed = |source| SceneError::File { path: path.to_owned(), source };
+    let about = std::fs::metadata(path).map_err(failed)?;
+    // Standard input, below /dev, is open already.
+    if !about.is_file() && !path.starts_with("/dev") {
+        let message = "it is no regular file, and a named pipe may wait for ever";
+        return Err(failed(std::io::Error::new(std::io::ErrorKind::InvalidInput, message)));
+    }
     let mut bytes = Vec::new();
-    if waits(path) {
-        return Err(failed(std::io::Error::new(
-            std::io::ErrorKind::InvalidInput,
-            "it is a named pipe, which may wait for ever",
-        )));
-    }
-    let file = File::open(path).map_err(failed)?;
-    // A file that is too long is refused before it is read. Pipes and devices do not tell their length.
-    let length = file.metadata().map_err(failed)?.len();
-    if length > MAX_BYTES {
-        return Err(SceneError::TooLong(Some(length)));
-    }
-    file.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(failed)?;
+    File::open(path).and_then(|file| file.take(MAX_BYTES + 1).read_to_end(&mut bytes)).map_err(failed)?;
+    // Pipes and devices do not tell their length.
     if bytes.len() as u64 > MAX_BYTES {
-        return Err(SceneError::TooLong(None));
+        return Err(SceneError::TooLong(about.len().max(bytes.len() as u64)));
     }
     let text = std::str::from_utf8(&bytes).map_err(|wrong| {
         let byte = wrong.valid_up_to();
@@ -116,21 +108,21 @@ pub fn read_file(path: &Path, overrides: &[Override]) -> Result<Scene, SceneErro
 /// The error, its key, and its position in the text or in an override.
 pub fn read(text: &str, overrides: &[Override]) -> Result<Scene, SceneError> {
     if text.len() as u64 > MAX_BYTES {
-        return Err(SceneError::TooLong(None));
+        return Err(SceneError::TooLong(text.len() as u64));
     }
     let text = text.trim_start_matches('\u{feff}');
+    let malformed = |list| SceneError::Malformed(Problems { list, more: 0 });
+    let no_scene = |message: String, place| malformed(vec![Problem { path: String::new(), message, place }]);
     if text.trim().is_empty() {
-        let message = format!("the text is empty; {SHAPE}");
-        return Err(Malformed { path: String::new(), message, place: None, others: Vec::new() }.into());
+        return Err(no_scene(format!("the text is empty; {SHAPE}"), None));
     }
-    let mut json = parse(text)?;
+    let mut json = parse(text).map_err(|problem| malformed(vec![problem]))?;
     for replaced in overrides {
         replaced.apply(&mut json)?;
     }
     make_whole(&mut json);
     if !json.is_object() {
-        let place = Some(Place::at(text, 0));
-        return Err(Malformed { path: String::new(), message: SHAPE.to_owned(), place, others: Vec::new() }.into());
+        return Err(no_scene(SHAPE.to_owned(), Some(Place::at(text, 0))));
     }
 
     let place = |steps: &[Step]| find(steps, text, overrides);
@@ -141,32 +133,17 @@ pub fn read(text: &str, overrides: &[Override]) -> Result<Scene, SceneError> {
         SceneError::Values(problems)
     };
     let chosen = accuracy::set_keys(&mut json).map_err(placed)?;
-    let malformed = |(steps, message): (Vec<Step>, String)| Malformed {
-        path: path(&steps),
-        message: shortened(message),
-        place: place(&steps),
-        others: Vec::new(),
-    };
-    let mut wrong = keys::wrong(&json).into_iter().take(KEPT).map(malformed);
-    if let Some(first) = wrong.next() {
-        return Err(Malformed { others: wrong.collect(), ..first }.into());
+    let problem = |(steps, message): (Vec<Step>, String)| Problem { path: path(&steps), message, place: place(&steps) };
+    let wrong = keys::wrong(&json);
+    if !wrong.is_empty() {
+        let more = wrong.len().saturating_sub(KEPT);
+        let list = wrong.into_iter().take(KEPT).map(problem).collect();
+        return Err(SceneError::Malformed(Problems { list, more }));
     }
     let scene: Scene = serde_path_to_error::deserialize(&json)
-        .map_err(|error| malformed((segments(error.path()), error.inner().to_string())))?;
+        .map_err(|error| malformed(vec![problem((segments(error.path()), error.inner().to_string()))]))?;
     let problems = scene.check();
     if problems.is_empty() { Ok(Scene { chosen, ..scene.complete() }) } else { Err(placed(problems)) }
-}
-
-/// Whether opening the file may block until somebody writes to it. Standard input, below /dev, is open already.
-#[cfg(unix)]
-fn waits(path: &Path) -> bool {
-    use std::os::unix::fs::FileTypeExt;
-    !path.starts_with("/dev") && std::fs::metadata(path).is_ok_and(|file| file.file_type().is_fifo())
-}
-
-#[cfg(not(unix))]
-fn waits(_: &Path) -> bool {
-    false
 }
 
 /// Makes numbers such as 2.0 integers, as JSON Schema counts them.
@@ -196,14 +173,4 @@ fn find(steps: &[Step], text: &str, overrides: &[Override]) -> Option<Place> {
     replaced
         .map(|one| Place::Override(one.argument().to_owned()))
         .or_else(|| found.map(|(offset, _)| Place::at(text, offset)))
-}
-
-/// Maximum characters of a message, which quotes the text.
-const MESSAGE: usize = 600;
-
-fn shortened(message: String) -> String {
-    if message.chars().count() <= MESSAGE {
-        return message;
-    }
-    message.chars().take(MESSAGE).chain("…".chars()).collect()
 }

@@ -1,9 +1,9 @@
 //! Regions of space in a scene.
 
-use super::build_error::BuildError;
+use super::BuildError;
 use super::image_file::ImageFile;
 use super::surface_file::SurfaceFile;
-use super::vector::{self, corners, direction};
+use super::vector::{self, check_axis, corners, direction};
 use crate::problems::{LARGEST, MOST, Problems};
 use crate::shape::{self, EDGE, PolygonError, rotation};
 use crate::tensor::{Tensor, Vector, identity};
@@ -124,11 +124,13 @@ impl Shape {
         self.build().ok_or_else(|| BuildError::at(path, format!("does not fit {D} dimensions")))
     }
 
-    pub(super) fn check(&self, problems: &mut Problems, path: &str, dimension: usize) {
+    /// The corners of the bounding box; `None` if the shape is not allowed, with the reasons in `problems`, and while its file has not been
+    /// read.
+    pub(super) fn check(&self, problems: &mut Problems, path: &str, dimension: usize) -> Option<[Vec<f64>; 2]> {
         match dimension {
-            1 => drop(self.checked::<1>(problems, path)),
-            2 => drop(self.checked::<2>(problems, path)),
-            _ => drop(self.checked::<3>(problems, path)),
+            1 => self.checked::<1>(problems, path).map(bounds),
+            2 => self.checked::<2>(problems, path).map(bounds),
+            _ => self.checked::<3>(problems, path).map(bounds),
         }
     }
 
@@ -174,10 +176,10 @@ impl Shape {
             Self::Rotated { about, angle, axis, .. } => {
                 let of = self.checked_parts(problems, path);
                 let about = vector::checked(problems, &at("rotated.about"), about);
-                let allowed = problems.number(&at("rotated.angle"), *angle);
-                let of = of.filter(|_| allowed)?.pop()?;
-                let axis = rotation_axis(axis.as_deref(), problems, &at("rotated"))?;
-                similar(of, about?, rotation(*angle, axis.as_ref())?, 1.0)
+                let allowed = problems.number(&at("rotated.angle"), *angle)
+                    & check_axis(problems, &at("rotated"), axis.as_deref(), D);
+                let axis = axis.as_ref().filter(|_| allowed).map(|axis| vector::vector(axis));
+                similar(of.filter(|_| allowed)?.pop()?, about?, rotation(*angle, axis.as_ref())?, 1.0)
             }
             Self::Scaled { about, factor, .. } => {
                 let of = self.checked_parts(problems, path);
@@ -229,6 +231,11 @@ impl Shape {
     }
 }
 
+fn bounds<const D: usize>(shape: shape::Shape<D>) -> [Vec<f64>; 2] {
+    let (min, max) = shape.bounding_box();
+    [min.as_slice().to_vec(), max.as_slice().to_vec()]
+}
+
 fn numbered<'a>(key: &str, parts: &'a [Shape]) -> Vec<(String, &'a Shape)> {
     parts.iter().take(MOST).enumerate().map(|(i, part)| (format!("{key}[{i}]"), part)).collect()
 }
@@ -276,9 +283,9 @@ fn cone<const D: usize>(
         problems.refuse(path, "a solid around an axis", "a line has none: use a box");
         return None;
     }
-    let ends = [("from", from), ("to", to)].map(|(key, x)| vector::checked(problems, &format!("{path}.{key}"), x));
-    let [from, to] = ends;
-    let (from, to): (Vector<f64, D>, Vector<f64, D>) = (from?, to?);
+    let from = vector::checked::<D>(problems, &format!("{path}.from"), from);
+    let to = vector::checked::<D>(problems, &format!("{path}.to"), to);
+    let (from, to) = (from?, to?);
     if (to - from).norm() <= EDGE * radii[0].max(radii[1]) {
         let allowed = "must differ from `from`: the two give the axis";
         problems.refuse(&format!("{path}.to"), format!("{:?}", to.as_slice()), allowed);
@@ -288,42 +295,20 @@ fn cone<const D: usize>(
 
 /// Checks the radii of a cone. One of them may be 0.
 fn check_radii(radii: [f64; 2], problems: &mut Problems, path: &str) -> bool {
-    let mut ok = true;
-    for (i, radius) in radii.into_iter().enumerate() {
-        ok &= problems.between(&format!("{path}[{i}]"), radius, 0.0, LARGEST);
-    }
-    if ok && radii == [0.0, 0.0] {
-        problems.refuse(path, "[0, 0]", "one of the two must be > 0");
-        return false;
-    }
-    ok
-}
-
-/// The axis of a rotated shape: needed in 3D, and not allowed in 2D. `None` if it is not allowed, with the reason in `problems`.
-fn rotation_axis<const D: usize>(
-    axis: Option<&[f64]>,
-    problems: &mut Problems,
-    path: &str,
-) -> Option<Option<Vector<f64, D>>> {
-    let axis_path = format!("{path}.axis");
-    match (axis, D) {
-        (Some(axis), 3) => return direction(problems, &axis_path, axis).map(Some),
-        (None, 2) => return Some(None),
-        (None, 3) => problems.refuse(path, "a rotation without an axis", "give its \"axis\", a direction"),
-        (Some(_), 2) => problems.refuse(&axis_path, "an axis", "in 2 dimensions it is the third: remove it"),
-        _ => problems.refuse(path, "a rotation", "a line has no directions to turn in"),
-    }
-    None
+    let check = |(i, radius)| problems.between(&format!("{path}[{i}]"), radius, 0.0, LARGEST);
+    let ok = radii.into_iter().enumerate().map(check).fold(true, |all, ok| all && ok);
+    problems.require(!ok || radii != [0.0, 0.0], path, "[0, 0]", "one of the two must be > 0");
+    ok && radii != [0.0, 0.0]
 }
 
 /// The surface; `None` if it is not allowed, with the reason in `problems`, and while its file has not been read.
 fn surface<const D: usize>(file: &SurfaceFile, problems: &mut Problems, path: &str) -> Option<shape::Surface<D>> {
     if D != 3 {
-        problems.refuse(path, "a surface", format!("it needs a grid of 3 dimensions, and this one has {D}"));
+        problems.refuse(path, "a surface", format_args!("it needs a grid of 3 dimensions, and this one has {D}"));
         return None;
     }
-    let found = format_args!("{:?}", file.file);
-    problems.require(file.has_format(), &format!("{path}.file"), found, "must end in .stl or .ply");
+    let path = format!("{path}.file");
+    problems.require(file.has_format(), &path, format_args!("{:?}", file.file), "must end in .stl or .ply");
     file.surface.get()?.in_dimension()
 }
 

@@ -65,13 +65,8 @@ pub enum Precision {
 impl Default for Krylov {
     fn default() -> Self {
         let NewtonSettings { krylov, forcing, max_krylov_iterations, .. } = NewtonSettings::default();
-        Self {
-            method: krylov,
-            preconditioner: Preconditioning::default(),
-            forcing,
-            precision: None,
-            max_iterations: max_krylov_iterations as u32,
-        }
+        let (preconditioner, max_iterations) = (Preconditioning::default(), max_krylov_iterations as u32);
+        Self { method: krylov, preconditioner, forcing, precision: None, max_iterations }
     }
 }
 

@@ -1,6 +1,6 @@
 //! Surfaces of triangles from files of STL and PLY.
 
-use super::file::{ShapeFileError, open};
+use super::file::{FileError, ending, open};
 use crate::shape::{Surface, SurfaceError};
 use crate::tensor::Vector;
 use ply_rs_bw::parser::Parser;
@@ -32,34 +32,17 @@ pub struct SurfaceFile {
 /// Vertex positions, and the three vertex numbers of each triangle.
 type Triangles = (Vec<[f64; 3]>, Vec<[usize; 3]>);
 
-/// The supported formats.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Format {
-    Stl,
-    Ply,
-}
-
-impl Format {
-    fn of(path: &Path) -> Option<Self> {
-        match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
-            "stl" => Some(Self::Stl),
-            "ply" => Some(Self::Ply),
-            _ => None,
-        }
-    }
-}
-
 impl SurfaceFile {
     /// Whether the name of the file has the ending of a supported format.
     pub(super) fn has_format(&self) -> bool {
-        Format::of(&self.file).is_some()
+        ["stl", "ply"].contains(&ending(&self.file).as_str())
     }
 
     /// Reads the file, unless it has been read.
     ///
     /// # Errors
     /// The errors of [`read_file`].
-    pub(super) fn read(&self, folder: &Path) -> Result<(), ShapeFileError> {
+    pub(super) fn read(&self, folder: &Path) -> Result<(), FileError> {
         if self.surface.get().is_none() {
             let _ = self.surface.set(read_file(&folder.join(&self.file))?);
         }
@@ -86,21 +69,21 @@ impl SurfaceFile {
 ///
 /// # Errors
 /// The file cannot be read, or its surface is open, faces both ways or crosses itself (with the position).
-pub fn read_file(path: &Path) -> Result<Surface<3>, ShapeFileError> {
-    let format = Format::of(path).ok_or_else(|| ShapeFileError("must end in .stl or .ply".to_owned()))?;
+pub fn read_file(path: &Path) -> Result<Surface<3>, FileError> {
     let (mut file, length) = open(path)?;
     if length > MAX_BYTES {
-        return Err(ShapeFileError(format!("has {length} bytes; at most {MAX_BYTES} are read")));
+        return Err(FileError(format!("has {length} bytes; at most {MAX_BYTES} are read")));
     }
-    let (corners, triangles): Triangles = match format {
-        Format::Stl => {
+    let (corners, triangles): Triangles = match ending(path).as_str() {
+        "stl" => {
             let mesh = stl_io::read_stl(&mut file)?;
             let corners = mesh.vertices.iter().map(|x| x.0.map(f64::from)).collect();
             (corners, mesh.faces.iter().map(|face| face.vertices).collect())
         }
-        Format::Ply => of_ply(&mut file)?,
+        "ply" => of_ply(&mut file)?,
+        _ => return Err(FileError("must end in .stl or .ply".to_owned())),
     };
-    joined(&corners, &triangles).map_err(|error| ShapeFileError(format!("holds {error}")))
+    joined(&corners, &triangles).map_err(|error| FileError(format!("holds {error}")))
 }
 
 /// The surface, with coincident vertices merged.
@@ -154,10 +137,10 @@ impl PropertyAccess for Entry {
 }
 
 /// Vertices and triangles of a PLY file. A face with more than three vertices becomes a fan of triangles.
-fn of_ply(file: &mut BufReader<File>) -> Result<Triangles, ShapeFileError> {
+fn of_ply(file: &mut BufReader<File>) -> Result<Triangles, FileError> {
     let ply = Parser::<Entry>::new().read_ply(file).map_err(io::Error::other)?;
     let list = |name| ply.payload.get(name).map_or(&[][..], Vec::as_slice);
-    let lacks = |what| move || ShapeFileError(format!("has no {what}"));
+    let lacks = |what| move || FileError(format!("has no {what}"));
     let place = |entry: &Entry| match entry.place {
         [Some(x), Some(y), Some(z)] => Ok([x, y, z]),
         _ => Err(lacks("x, y and z of its vertices")()),
@@ -166,15 +149,11 @@ fn of_ply(file: &mut BufReader<File>) -> Result<Triangles, ShapeFileError> {
     let mut triangles = Vec::new();
     for (face, entry) in list("face").iter().enumerate() {
         let list = entry.corners.as_ref().ok_or_else(lacks("vertex_indices of its faces"))?;
-        let [first, rest @ ..] = list.as_slice() else { return Err(too_few_corners(face, 0)) };
-        if rest.len() < 2 {
-            return Err(too_few_corners(face, list.len()));
+        if list.len() < 3 {
+            return Err(FileError(format!("face {face} has {} corners (faces are counted from 0)", list.len())));
         }
-        triangles.extend(rest.windows(2).map(|pair| [*first, pair[0], pair[1]].map(|corner| corner as usize)));
+        let fan = list[1..].windows(2).map(|pair| [list[0], pair[0], pair[1]]);
+        triangles.extend(fan.map(|triangle| triangle.map(|corner| corner as usize)));
     }
     Ok((corners, triangles))
-}
-
-fn too_few_corners(face: usize, corners: usize) -> ShapeFileError {
-    ShapeFileError(format!("face {face} has {corners} corners (faces are counted from 0)"))
 }

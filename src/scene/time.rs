@@ -1,5 +1,6 @@
 //! Time stepping.
 
+use super::default_number;
 use crate::clock::MAX_HALVINGS;
 use crate::mechanics::schemes::{self, Newmark};
 use crate::mechanics::transfer::{Projection, WallUpdate};
@@ -45,7 +46,7 @@ pub struct Time {
     /// have the length `step`.
     pub adaptive: Option<Adaptive>,
     /// Maximum number of times that a failed step is halved, 0 to 20. Default 10.
-    #[serde(default = "Time::default_max_halvings")]
+    #[serde(default = "default_number::<10>")]
     #[schemars(range(min = 0, max = MAX_HALVINGS))]
     pub max_halvings: u32,
 }
@@ -63,10 +64,6 @@ pub struct Adaptive {
 }
 
 impl Time {
-    fn default_max_halvings() -> u32 {
-        10
-    }
-
     /// The time integration scheme.
     ///
     /// ```
@@ -130,65 +127,15 @@ impl Time {
         }
     }
 
-    /// The given keys that have a meaning only with inertia, with their values.
-    pub(super) fn of_inertia(&self) -> impl Iterator<Item = (&'static str, String)> {
-        let number = |x: Option<f64>| x.map(|x| Number(x).to_string());
-        [
-            ("time.beta", number(self.beta)),
-            ("time.gamma", number(self.gamma)),
-            ("time.lumping", number(self.lumping)),
-            ("time.initial_guess", self.initial_guess.filter(|&guess| guess == InitialGuess::Velocity).map(word)),
-            ("time.projection", self.projection.map(word)),
-            ("time.wall_update", self.wall_update.map(word)),
-            ("time.adaptive", self.adaptive.map(word)),
-        ]
-        .into_iter()
-        .filter_map(|(key, value)| Some((key, value?)))
-    }
-
-    /// This section with the end `end`, given on the command line by `option`.
-    ///
-    /// ```
-    /// let time = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?.time;
-    /// let shorter = time.until(30.0, "--until").map_err(bfree::scene::SceneError::Values)?;
-    /// assert_eq!((shorter.end, shorter.step), (30.0, time.step));
-    /// // Less than a step is wrong, and it is the option that is.
-    /// let problems = time.until(0.01, "--until").unwrap_err();
-    /// assert_eq!(problems.list[0].path, "--until");
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    ///
-    /// # Errors
-    /// A value that `time.end` may not have in a scene either.
-    pub fn until(&self, end: f64, option: &str) -> Result<Self, Problems> {
-        let time = Self { end, ..self.clone() };
-        let mut problems = Problems::default();
-        time.check(&mut problems);
-        for problem in &mut problems.list {
-            // The scene's own end passed all checks, so every problem is one of the option.
-            problem.path = option.to_owned();
-            problem.value = Number(end).to_string();
-        }
-        if problems.is_empty() { Ok(time) } else { Err(problems) }
-    }
-
     pub(super) fn check(&self, problems: &mut Problems) {
         let step_ok = problems.positive("time.step", self.step);
         if problems.positive("time.end", self.end) && step_ok {
             let (step, end) = (Number(self.step), Number(self.end));
-            problems.require(
-                self.end >= self.step,
-                "time.end",
-                &end,
-                format_args!("must be at least one step, {step}"),
-            );
+            let allowed = format!("must be at least one step, {step}");
+            problems.require(self.end >= self.step, "time.end", &end, allowed);
             let steps = self.end / self.step;
-            problems.require(
-                steps <= MAX_STEPS,
-                "time.step",
-                &step,
-                format_args!("reaching the end at {end} takes {steps:e} steps; at most {MAX_STEPS:e} are allowed"),
-            );
+            let allowed = format!("reaching the end at {end} takes {steps:e} steps; at most {MAX_STEPS:e} are allowed");
+            problems.require(steps <= MAX_STEPS, "time.step", format_args!("a step of {step}"), allowed);
         }
         self.scheme().check(problems, "time.scheme");
         for (key, given) in [("time.beta", self.beta), ("time.gamma", self.gamma)] {
@@ -198,29 +145,16 @@ impl Time {
         }
         // 2β ≥ γ ≥ ½, up to round-off in values such as β = (γ + ½)²/4.
         let Newmark { beta, gamma } = self.newmark();
-        let gamma_ok = (0.5..=2.0).contains(&gamma);
-        problems.require(
-            gamma_ok,
-            "time.gamma",
-            Number(gamma),
-            "must lie between 0.5 and 2 (stability: 2 beta >= gamma >= 0.5)",
-        );
+        let allowed = "must lie between 0.5 and 2 (stability: 2 beta >= gamma >= 0.5)";
+        problems.require((0.5..=2.0).contains(&gamma), "time.gamma", Number(gamma), allowed);
         let lowest = 0.5 * gamma.clamp(0.5, 2.0);
-        problems.require(
-            beta >= lowest * (1.0 - 1e-12) && beta <= 2.0,
-            "time.beta",
-            Number(beta),
-            format_args!("must lie between gamma/2 = {lowest} and 2 (stability: 2 beta >= gamma >= 0.5)"),
-        );
+        let beta_ok = beta >= lowest * (1.0 - 1e-12) && beta <= 2.0;
+        let allowed = format!("must lie between gamma/2 = {lowest} and 2 (stability: 2 beta >= gamma >= 0.5)");
+        problems.require(beta_ok, "time.beta", Number(beta), allowed);
         problems.between("time.lumping", self.lumping(), 0.0, 1.0);
         if let Some(Adaptive { tolerance }) = self.adaptive {
-            let ok = problems.positive("time.adaptive.tolerance", tolerance);
-            problems.require(
-                !ok || tolerance <= 1.0,
-                "time.adaptive.tolerance",
-                Number(tolerance),
-                "must be at most 1",
-            );
+            let small = !problems.positive("time.adaptive.tolerance", tolerance) || tolerance <= 1.0;
+            problems.require(small, "time.adaptive.tolerance", Number(tolerance), "must be at most 1");
         }
         problems.whole("time.max_halvings", self.max_halvings, 0, MAX_HALVINGS);
     }

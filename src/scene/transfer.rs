@@ -1,5 +1,6 @@
 //! Transfer from nodes to particles.
 
+use super::default_number;
 use crate::problems::Problems;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -26,7 +27,7 @@ pub enum Transfer {
 #[serde(deny_unknown_fields)]
 pub struct Pic {
     /// Number of terms of the series for the consistent projection, 1 to 20. One term is PIC, and more terms smooth less. Default 1.
-    #[serde(default = "default_order")]
+    #[serde(default = "default_number::<1>")]
     #[schemars(range(min = 1, max = 20))]
     pub order: u32,
 }
@@ -36,7 +37,7 @@ pub struct Pic {
 #[serde(deny_unknown_fields)]
 pub struct Blend {
     /// Number of terms of the series for the consistent projection, 1 to 20. One term draws towards PIC. Default 1.
-    #[serde(default = "default_order")]
+    #[serde(default = "default_number::<1>")]
     #[schemars(range(min = 1, max = 20))]
     pub order: u32,
     /// The rate (1/time), > 0. With order 1, a front free of ringing needs about 1.2 (c/h) (h/L)^(1/4). Here c is the speed of sound, h the
@@ -53,10 +54,6 @@ pub struct Limited {
     /// is recommended, with c the speed of sound and h the spacing; see `scenes/riemann_jump.json`.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub rate: f64,
-}
-
-fn default_order() -> u32 {
-    1
 }
 
 impl Transfer {

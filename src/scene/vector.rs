@@ -14,6 +14,19 @@ pub(super) fn check_normal(problems: &mut Problems, path: &str, normal: &[f64], 
     ok
 }
 
+/// Checks the axis of a rotation: needed in 3D, and not allowed in 2D.
+pub(super) fn check_axis(problems: &mut Problems, path: &str, axis: Option<&[f64]>, dimension: usize) -> bool {
+    let axis_path = format!("{path}.axis");
+    match (axis, dimension) {
+        (Some(axis), 3) => return check_normal(problems, &axis_path, axis, dimension),
+        (None, 2) => return true,
+        (None, 3) => problems.refuse(path, "a rotation without an axis", "give its \"axis\", a direction"),
+        (Some(_), 2) => problems.refuse(&axis_path, "an axis", "in 2D it is z: remove it"),
+        _ => problems.refuse(path, "a rotation", "a line has no directions to turn in"),
+    }
+    false
+}
+
 /// The components as a vector. There must be `D`, as in every scene that has passed its checks.
 pub(super) fn vector<const D: usize>(components: &[f64]) -> Vector<f64, D> {
     Vector::from_column_slice(components)

@@ -1,13 +1,11 @@
 //! Warnings, with numbers, about scenes that run but may be wrong. `bfree check` and the start of a run print these warnings.
 
-use super::body::Body;
 use super::shape::Shape as Drawn;
 use super::time::word;
 use super::{BodyUse, Scene};
 use crate::grid::{Grid, indices};
 use crate::material::{Law, Material, poissons_ratio};
 use crate::mechanics::loads::SurfaceLoad;
-use crate::mechanics::loads::{Pressing, Selection};
 use crate::shape::{EDGE, Fill, Intersection, Shape, around};
 use crate::simulation::Simulation;
 use crate::tensor::{Deformation, Tensor, Vector};
@@ -39,7 +37,6 @@ const LOCKING_POISSON: f64 = 0.45;
 /// The built bodies of a scene.
 struct Bodies<'a, const D: usize> {
     simulation: &'a Simulation<D>,
-    scene: &'a [Body],
     shapes: Vec<Option<Shape<D>>>,
     /// Indices of the particles with a volume, for each body.
     particles: Vec<Vec<usize>>,
@@ -63,31 +60,29 @@ impl Scene {
     pub fn warnings<const D: usize>(&self, simulation: &Simulation<D>) -> Vec<String> {
         let mut particles = vec![Vec::new(); self.bodies.len()];
         for p in (0..simulation.particles.len()).filter(|&p| simulation.particles.is_solid(p)) {
-            particles.get_mut(simulation.particles.body[p] as usize).into_iter().for_each(|own| own.push(p));
+            if let Some(own) = particles.get_mut(simulation.particles.body[p] as usize) {
+                own.push(p);
+            }
         }
         let shapes = self.bodies.iter().map(|body| body.shape.as_ref().and_then(Drawn::build)).collect();
-        let bodies = Bodies { simulation, scene: &self.bodies, shapes, particles };
-        let mut all: Vec<String> = (1..self.bodies.len())
-            .flat_map(|a| (0..a).map(move |b| (b, a)))
-            .filter_map(|(a, b)| bodies.overlap(a, b))
-            .collect();
+        let bodies = Bodies { simulation, shapes, particles };
+        let numbers = 0..self.bodies.len();
+        let pairs = numbers.clone().flat_map(|b| (0..b).map(move |a| (a, b)));
+        let mut all: Vec<String> = pairs.filter_map(|(a, b)| bodies.overlap(a, b)).collect();
         all.extend(self.deprecated_keys());
         all.extend(bodies.coincident());
-        all.extend((0..self.bodies.len()).filter_map(|body| bodies.thin(body)));
-        all.extend((0..self.bodies.len()).filter_map(|body| bodies.locks(body)));
-        let filled = self.filled_otherwise(simulation);
-        all.extend(filled.into_iter().filter_map(|(number, body)| volume_differs(number, &body)));
-        let prescribed = simulation.loads.prescribed.iter().filter_map(|prescribed| match &prescribed.on {
-            Selection::Region(region) => Some(region.clone()),
-            Selection::Face { .. } => None,
-        });
+        all.extend(numbers.clone().filter_map(|body| bodies.thin(body)));
+        all.extend(numbers.filter_map(|body| bodies.locks(body)));
+        if self.bodies.iter().any(|body| body.fill != Fill::Cut) {
+            let filled = self.filled(simulation).into_iter().enumerate();
+            let filled = filled.filter(|(number, _)| self.bodies[*number].fill != Fill::Cut);
+            all.extend(filled.filter_map(|(number, body)| volume_differs(number, &body)));
+        }
+        let grid = &simulation.grid;
+        let prescribed = self.prescribed.iter().filter_map(|prescribed| prescribed.region.build());
+        all.extend(without_nodes(grid, "prescribed", prescribed));
         let initial = self.initial_velocity.iter().flat_map(|initial| &initial.nodes);
-        all.extend(without_nodes(&simulation.grid, "prescribed", prescribed));
-        all.extend(without_nodes(
-            &simulation.grid,
-            "initial_velocity.nodes",
-            initial.filter_map(|node| node.region.build()),
-        ));
+        all.extend(without_nodes(grid, "initial_velocity.nodes", initial.filter_map(|node| node.region.build())));
         let loaded = self.tractions.iter().zip(&simulation.loads.surface).enumerate();
         all.extend(loaded.filter_map(|(i, (traction, load))| {
             let body = self.bodies.iter().find(|body| body.name == traction.body)?;
@@ -98,58 +93,41 @@ impl Scene {
     }
 
     /// Notes on given keys that the next release refuses.
-    fn deprecated_keys(&self) -> Vec<String> {
+    fn deprecated_keys(&self) -> impl Iterator<Item = String> {
         let ghost_stiffness = self.ghost_stiffness.map(|factor| {
-            let replaced = self.aggregates();
+            let is = self.aggregates();
             format!(
-                "ghost_stiffness = {factor} is no longer used: aggregation has replaced it, and is {replaced} here. Remove the key; the \
-                 next release refuses it"
+                "ghost_stiffness = {factor} is no longer used: aggregation has replaced it, and is {is} here. Remove"
             )
         });
         let precision = self.solver.krylov.precision.map(|_| {
-            "solver.krylov.precision is no longer used: all linear systems are solved in double precision. Remove the key; the next \
-             release refuses it"
-                .to_owned()
+            "solver.krylov.precision is no longer used: all linear systems are solved in double precision. Remove"
+                .into()
         });
         let inertia = self.time.inertia.map(|_| {
             let scheme = word(self.time.scheme());
-            format!("time.inertia is now called time.scheme, which is {scheme} here. Rename the key; the next release refuses it")
+            format!("time.inertia is now called time.scheme, which is {scheme} here. Rename")
         });
-        let renewed = self
-            .grid
-            .renewed
-            .map(|_| "grid.renewed is now called grid.reset. Rename the key; the next release refuses it".to_owned());
-        ghost_stiffness.into_iter().chain(precision).chain(inertia).chain(renewed).collect()
-    }
-
-    /// Bodies whose volume may differ from that of their shape, with their numbers.
-    fn filled_otherwise<const D: usize>(&self, simulation: &Simulation<D>) -> Vec<(usize, BodyUse)> {
-        if self.bodies.iter().all(|body| body.fill == Fill::Cut) {
-            return Vec::new();
-        }
-        let whole = |(i, _): &(usize, BodyUse)| self.bodies[*i].fill != Fill::Cut;
-        self.filled(simulation).into_iter().enumerate().filter(whole).collect()
+        let renewed = self.grid.renewed.map(|_| "grid.renewed is now called grid.reset. Rename".into());
+        let notes = [ghost_stiffness, precision, inertia, renewed].into_iter().flatten();
+        notes.map(|note| format!("{note} the key; the next release refuses it"))
     }
 }
 
 impl<const D: usize> Bodies<'_, D> {
-    fn spacing(&self) -> f64 {
-        self.simulation.grid.spacing
-    }
-
     /// Particles of `body` that lie in the shape of `other`.
     fn inside(&self, body: usize, other: usize) -> Vec<usize> {
         let Some(shape) = &self.shapes[other] else { return Vec::new() };
         let (min, max) = shape.bounding_box();
-        let round_off = EDGE * self.spacing();
         let own = self.shapes[body].as_ref().map(Shape::bounding_box);
         if own.is_some_and(|(own_min, own_max)| (0..D).any(|k| own_max[k] <= min[k] || own_min[k] >= max[k])) {
             return Vec::new();
         }
+        let round_off = EDGE * self.simulation.grid.spacing;
         let position = &self.simulation.particles.position;
-        let near = |p: &&usize| (0..D).all(|k| position[**p][k] > min[k] && position[**p][k] < max[k]);
-        let inside = |p: &&usize| shape.signed_distance(&position[**p]) < -round_off;
-        self.particles[body].iter().filter(near).filter(inside).copied().collect()
+        let near = |x: &Vector<f64, D>| (0..D).all(|k| x[k] > min[k] && x[k] < max[k]);
+        let inside = |p: &usize| near(&position[*p]) && shape.signed_distance(&position[*p]) < -round_off;
+        self.particles[body].iter().copied().filter(inside).collect()
     }
 
     /// Warns of two overlapping bodies. The volume of two shapes is that of their intersection in the cells of the overlapping particles.
@@ -166,7 +144,7 @@ impl<const D: usize> Bodies<'_, D> {
             }
             _ => found.iter().map(|&p| particles.volume[p]).sum(),
         };
-        let [a, b] = [a, b].map(|body| &self.scene[body].name);
+        let [a, b] = [a, b].map(|body| &self.simulation.bodies[body].name);
         (volume > VOLUME_UNCERTAINTY * cells.len() as f64 * grid.spacing.powi(D as i32)).then(|| {
             format!(
                 "bodies {a:?} and {b:?} overlap: {} particles of one lie in the other, in a volume of {volume:.4e}; there they move as \
@@ -178,23 +156,19 @@ impl<const D: usize> Bodies<'_, D> {
 
     /// Warns of coincident particles.
     fn coincident(&self) -> Option<String> {
-        let position = &self.simulation.particles.position;
-        let key = |p: usize| -> [i64; D] {
-            std::array::from_fn(|k| {
-                let from = position[p][k] - self.simulation.grid.origin[k];
-                (from / (COINCIDENT * self.spacing())).round() as i64
-            })
-        };
-        let mut keys: Vec<([i64; D], usize)> = self.particles.iter().flatten().map(|&p| (key(p), p)).collect();
+        let (grid, position) = (&self.simulation.grid, &self.simulation.particles.position);
+        let key = |p: usize| (position[p] - grid.origin).map(|x| (x / (COINCIDENT * grid.spacing)).round() as i64);
+        let keys = self.particles.iter().flatten().map(|&p| (<[i64; D]>::from(key(p)), p));
+        let mut keys: Vec<_> = keys.collect();
         keys.sort_unstable();
         let same: Vec<usize> = keys.windows(2).filter(|pair| pair[0].0 == pair[1].0).map(|pair| pair[1].1).collect();
-        let places = same.iter().take(MAX_NAMED).map(|&p| {
-            let place: Vec<String> = position[p].iter().map(ToString::to_string).collect();
+        let place = |p: &usize| {
+            let place: Vec<String> = position[*p].iter().map(ToString::to_string).collect();
             format!("({})", place.join(", "))
-        });
+        };
+        let places = same.iter().take(MAX_NAMED).map(place).collect::<Vec<_>>().join(", ");
+        let more = if same.len() > MAX_NAMED { ", …" } else { "" };
         (!same.is_empty()).then(|| {
-            let places = places.collect::<Vec<_>>().join(", ");
-            let more = if same.len() > MAX_NAMED { ", …" } else { "" };
             format!("{} particles lie at the place of another one: at {places}{more}; they move as one", same.len())
         })
     }
@@ -202,32 +176,31 @@ impl<const D: usize> Bodies<'_, D> {
     /// Warns of a body thinner than two cells. The thickness is twice the greatest depth of a particle plus the width of that particle.
     /// Without a shape, the thickness is the smallest extent of the body.
     fn thin(&self, body: usize) -> Option<String> {
-        let (own, particles, h) = (&self.particles[body], &self.simulation.particles, self.spacing());
+        let (own, particles, h) = (&self.particles[body], &self.simulation.particles, self.simulation.grid.spacing);
         let width = |p: usize| particles.volume[p].powf(1.0 / D as f64);
         let enough = MIN_CELLS_ACROSS * h * THICKNESS_TOLERANCE;
-        let across = match &self.shapes[body] {
-            Some(shape) => {
-                let mut most: f64 = 0.0;
-                // The loop starts in the middle of the list, because the first particles lie at the surface.
-                let (first, last) = own.split_at(own.len() / 2);
-                for &p in last.iter().chain(first) {
-                    most = most.max(width(p) - 2.0 * shape.signed_distance(&particles.position[p]));
-                    if most >= enough {
-                        return None;
-                    }
+        let mut across: f64 = 0.0;
+        if let Some(shape) = &self.shapes[body] {
+            // The loop starts in the middle of the list, because the first particles lie at the surface.
+            let (first, last) = own.split_at(own.len() / 2);
+            for &p in last.iter().chain(first) {
+                across = across.max(width(p) - 2.0 * shape.signed_distance(&particles.position[p]));
+                if across >= enough {
+                    return None;
                 }
-                most
             }
-            None => {
-                (0..D).map(|k| self.extent(own, k)).fold(f64::INFINITY, f64::min) + own.first().map(|&p| width(p))?
-            }
-        };
+        } else {
+            let extent = |k: usize| {
+                let along = || own.iter().map(|&p| particles.position[p][k]);
+                along().fold(f64::NEG_INFINITY, f64::max) - along().fold(f64::INFINITY, f64::min)
+            };
+            across = (0..D).map(extent).fold(f64::INFINITY, f64::min) + own.first().map(|&p| width(p))?;
+        }
+        let (name, cells) = (&self.simulation.bodies[body].name, across / h);
         (across < enough).then(|| {
-            let name = &self.scene[body].name;
             format!(
-                "body {name:?} is about {across:.3e} thick where it is thickest, {:.2} cells; from {MIN_CELLS_ACROSS} on it bends and presses as it \
-                 should: lower grid.spacing",
-                across / h
+                "body {name:?} is about {across:.3e} thick where it is thickest, {cells:.2} cells; from {MIN_CELLS_ACROSS} on it bends and \
+                 presses as it should: lower grid.spacing"
             )
         })
     }
@@ -242,23 +215,17 @@ impl<const D: usize> Bodies<'_, D> {
             return None;
         }
         let why = if flows { "flows without a change of volume" } else { "hardly changes its volume" };
-        let cure = match body.law.volumetric(&Deformation::new(Tensor::<f64, 1>::zeros())) {
-            Some(_) => format!("bodies[{number}].volumetric = \"mean_dilatation\" cures it"),
-            None => {
-                "its law knows no \"volumetric\": \"mean_dilatation\"; take \"neo_hookean\" with that, or a finer grid"
-                    .to_owned()
-            }
+        let cure = if body.law.volumetric(&Deformation::new(Tensor::<f64, 1>::zeros())).is_some() {
+            format!("bodies[{number}].volumetric = \"mean_dilatation\" cures it")
+        } else {
+            "its law knows no \"volumetric\": \"mean_dilatation\"; take \"neo_hookean\" with that, or a finer grid"
+                .into()
         };
-        let name = &self.scene[number].name;
+        let name = &self.simulation.bodies[number].name;
         Some(format!(
             "body {name:?} {why} (Poisson's ratio {poisson:.6}), and its change of volume is not averaged: it may lock, too stiff by some \
              percent or by a half, with wrong pressures; {cure}"
         ))
-    }
-
-    fn extent(&self, own: &[usize], k: usize) -> f64 {
-        let along = || own.iter().map(|&p| self.simulation.particles.position[p][k]);
-        along().fold(f64::NEG_INFINITY, f64::max) - along().fold(f64::INFINITY, f64::min)
     }
 }
 
@@ -294,8 +261,7 @@ fn without_nodes<const D: usize>(grid: &Grid<D>, list: &str, regions: impl Itera
 fn staircase<const D: usize>(i: usize, load: &SurfaceLoad<D>) -> Option<String> {
     let area: f64 = load.points.iter().map(|point| point.area).sum();
     let flat = load.points.iter().map(|point| point.normal * point.area).sum::<Vector<f64, D>>().amax();
-    let traction = matches!(load.pressing, Pressing::Traction(_));
-    (traction && flat < (1.0 - EDGE) * area).then(|| {
+    (flat < (1.0 - EDGE) * area).then(|| {
         format!(
             "tractions[{i}] acts on a staircase of pixels: its area of {area:.4e} is up to {:.2} times that of the smooth surface, and so \
              is the force; a pressure has the right resultant",

@@ -20,13 +20,24 @@ pub(super) struct Balance<'a, const D: usize, L> {
     /// φ_n + θ Δφ
     pub phi: Pooled<Vector<f64, D>>,
     pub newton: NewtonReport,
-    /// The arguments of the load curves at t_n and at the solution: times, or λ on an equilibrium path.
-    pub loads: [f64; 2],
+    /// The argument of the load curves at the solution: the time, or λ on an equilibrium path.
+    pub load: f64,
     /// On an equilibrium path, the cosine of the angle between this Δφ and the last one.
     pub straight: Option<f64>,
 }
 
 impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
+    /// The argument of the load curves at t_n: the time, or λ on an equilibrium path.
+    pub(super) fn load(&self) -> f64 {
+        if self.settings.scheme.follows_path() { self.path.load } else { self.clock.time() }
+    }
+
+    /// The argument of the load curves where forces are in balance. On an equilibrium path, that of a load step.
+    pub(super) fn load_of_balance(&self) -> f64 {
+        let (dt, scheme) = (self.clock.step(), &self.settings.scheme);
+        if scheme.follows_path() { self.path.load_step(dt) } else { self.clock.time() + scheme.instant() * dt }
+    }
+
     /// Finds the motion under which forces are in balance.
     pub(super) fn balance<'a>(
         &'a self,
@@ -34,16 +45,14 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         nodal: &'a Nodal<D>,
         prescribed: &'a [PrescribedDof],
     ) -> Result<Balance<'a, D, L>, StepError> {
-        let (t, dt, scheme, settings) =
-            (self.clock.time(), self.clock.step(), &*self.settings.scheme, &self.settings.newton);
+        let (dt, scheme, settings) = (self.clock.step(), &*self.settings.scheme, &self.settings.newton);
         let theta = scheme.instant();
-        let [from, mut to] =
-            if scheme.follows_path() { [self.path.load, self.path.load_step(dt)] } else { [t, t + theta * dt] };
-        let under = |load: f64| {
+        let under = |load| {
             let equilibrium = self.equilibrium(supports, nodal, prescribed, scheme.balance(dt), load);
             Equilibrium { stop: self.settings.stop.as_ref(), ..equilibrium }
         };
-        let mut equilibrium = under(to);
+        let mut load = self.load_of_balance();
+        let mut equilibrium = under(load);
         let mut phi = self.initial_guess(supports, nodal, theta * dt);
         for dof in prescribed {
             phi[dof.node][dof.component] = theta * dof.step.increment;
@@ -51,25 +60,24 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         phi.iter_mut().zip(&nodal.motion).for_each(|(phi, before)| *phi += before);
         let (mut preconditioner, x) = (self.preconditioner().0.anew::<D>(), bytemuck::cast_slice_mut(&mut phi));
         let mut straight = None;
-        let newton = match self.history.grid.as_ref().filter(|_| scheme.follows_path()) {
-            None => newton(&equilibrium, &mut *preconditioner, x, settings, supports.pool())
-                .map_err(|error| self.explained(error, &equilibrium, supports))?,
-            Some(grid) => {
-                let start = under(from);
-                let force = |load| under(load).free_external_force(&nodal.motion);
-                let path = OnPath::new(self.path, &start, &force, &grid.rate, dt)?;
-                let report = newton(&path, &mut *preconditioner, x, settings, supports.pool())?;
-                to = path.load(&phi);
-                straight = Some(path.straight(&phi));
-                if path.ends(to)? {
-                    return Err(StepError::PathEnds { load: to });
-                }
-                equilibrium = under(to);
-                report
+        let newton = if scheme.follows_path() && !self.history.resets_grid() {
+            let start = under(self.load());
+            let force = |load| under(load).free_external_force(&nodal.motion);
+            let path = OnPath::new(self.path, &start, &force, &self.history.rate, dt)?;
+            let report = newton(&path, &mut *preconditioner, x, settings, supports.pool())?;
+            load = path.load(&phi);
+            straight = Some(path.straight(&phi));
+            if path.ends(load)? {
+                return Err(StepError::PathEnds { load });
             }
+            equilibrium = under(load);
+            report
+        } else {
+            newton(&equilibrium, &mut *preconditioner, x, settings, supports.pool())
+                .map_err(|error| self.explained(error, &equilibrium, supports))?
         };
         equilibrium.unknowns.followers.extend(&mut phi);
-        Ok(Balance { equilibrium, phi, newton, loads: [from, to], straight })
+        Ok(Balance { equilibrium, phi, newton, load, straight })
     }
 
     /// The Δφ that Newton's method starts from.
@@ -78,7 +86,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let rate: &[Vector<f64, D>] = match self.settings.initial_guess {
             InitialGuess::Zero => &[],
             InitialGuess::Velocity => &nodal.velocity,
-            InitialGuess::LastStep => self.history.grid.as_ref().map_or(&[], |grid| &grid.rate),
+            InitialGuess::LastStep => &self.history.rate,
         };
         dphi.iter_mut().zip(rate).for_each(|(dphi, rate)| *dphi = rate * dt);
         dphi
@@ -109,11 +117,9 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         equilibrium: &Equilibrium<'_, D, L>,
         dphi: &[Vector<f64, D>],
     ) -> Result<(), StepError> {
-        match self.settings.check_tangent {
-            Some(every) if self.clock.steps().is_multiple_of(every.get()) => {
-                Ok(equilibrium.check_tangent(dphi, &direction(dphi.len(), self.clock.steps()))?)
-            }
-            _ => Ok(()),
+        if self.settings.check_tangent.is_some_and(|every| self.clock.steps().is_multiple_of(every.get())) {
+            equilibrium.check_tangent(dphi, &direction(dphi.len(), self.clock.steps()))?;
         }
+        Ok(())
     }
 }

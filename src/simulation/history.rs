@@ -1,12 +1,10 @@
 //! The history of a simulation: the state of a grid that is not reset, and what decides when to reset it (`mechanics::reference`).
 
-use super::{Reaction, Sharing, Simulation};
+use super::{Reaction, Simulation};
 use crate::approximation::ShapeFunction;
 use crate::material::Law;
 use crate::mechanics::loads::PrescribedDof;
-use crate::mechanics::reference::{
-    GridReset, GridState, LastEquilibrium, pairs, reached_body, reached_conditions, touch,
-};
+use crate::mechanics::reference::{GridReset, LastEquilibrium, pairs, reached_body, reached_conditions, touch};
 use crate::mechanics::residual::Inadmissible;
 use crate::mechanics::schemes::Alphas;
 use crate::mechanics::sweep::Supports;
@@ -20,7 +18,9 @@ use std::sync::Arc;
 #[derive(Clone, Debug, Default)]
 pub struct History<const D: usize> {
     /// The nodal state; `None` if the next step resets the grid.
-    pub(crate) grid: Option<GridState<D>>,
+    pub(crate) grid: Option<Nodal<D>>,
+    /// Δφ/Δt of the last step; empty if the next step resets the grid.
+    pub(crate) rate: Vec<Vector<f64, D>>,
     /// The prescribed conditions that held bodies in the first step, without those that a body has reached since. All other conditions are
     /// contacts.
     pub(crate) constrained: BTreeSet<usize>,
@@ -47,23 +47,6 @@ impl<const D: usize> History<D> {
     }
 }
 
-/// A converged step, before the particles take it.
-pub(super) struct Solved<'a, const D: usize> {
-    /// The nodal state at t_n, projected or that of the last step.
-    pub nodal: &'a Nodal<D>,
-    pub prescribed: &'a [PrescribedDof],
-    pub dphi: &'a [Vector<f64, D>],
-    pub reactions: &'a [Reaction<D>],
-}
-
-/// The part of a step's report that is known once the particles have taken the step.
-pub(super) struct Accepted {
-    pub reset: bool,
-    pub feels_wall: bool,
-    pub sharing: Vec<Sharing>,
-    pub yielding: f64,
-}
-
 impl<const D: usize, L, A> Simulation<D, L, A> {
     /// Clears the history. Call this after a change of particle positions, deformations, laws or shape functions by hand: otherwise the
     /// next step starts from the grid of the last one, and ignores or carries over the change.
@@ -87,33 +70,42 @@ impl<const D: usize, L, A> Simulation<D, L, A> {
 }
 
 impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
-    /// Writes a step to the particles, and decides whether the next step resets the grid.
-    pub(super) fn accept(&mut self, update: Update<'_, D>, step: &Solved<'_, D>, supports: &Supports<D>) -> Accepted {
-        let (reset, dt) = (self.history.resets_grid(), self.clock.step());
+    /// Writes a step to the particles, and decides whether the next step resets the grid. `projected` is the nodal state at t_n without the
+    /// prescribed values. Returns the share of the volume of plastic bodies that flowed plastically.
+    pub(super) fn accept(
+        &mut self,
+        update: Update<'_, D>,
+        projected: &Nodal<D>,
+        prescribed: &[PrescribedDof],
+        reactions: &[Reaction<D>],
+        supports: &Supports<D>,
+    ) -> f64 {
+        let dt = self.clock.step();
         let field_positions = self.field_positions();
         let mut grid = None;
         if self.settings.grid_reset != GridReset::EveryStep {
             self.particles.store_reference();
-            grid = Some(GridState::new(&update.end(step.nodal), step.dphi, dt));
+            self.history.rate = update.rate(dt);
+            grid = Some(update.end(projected, supports.pool()));
         }
         let Committed { strain, yielding } = update.commit(&mut self.particles, &self.bodies, supports, dt);
-        let (feels_wall, sharing) = (self.feels_wall(step.prescribed), self.sharing(supports));
         if self.clock.steps() == 0 {
-            self.record_first_contacts(step.prescribed);
+            self.record_first_contacts(prescribed);
         }
         // Contact detection also updates the constrained conditions.
-        let contact = grid.is_some() && self.in_contact(supports, step.prescribed);
+        let contact = grid.is_some() && self.in_contact(supports, prescribed);
         self.history.grid = grid.filter(|_| !contact && self.settings.grid_reset.keeps(strain));
         self.history.equilibrium = None;
         if self.history.resets_grid() {
+            self.history.rate.clear();
             self.particles.reference = None;
             if !self.settings.scheme.has_inertia() {
                 let touching = self.bodies_touch(supports);
-                let last = LastEquilibrium::new(&self.loads, step.reactions.to_vec(), touching, field_positions);
+                let last = LastEquilibrium::new(&self.loads, reactions.to_vec(), touching, field_positions);
                 self.history.equilibrium = Some(last);
             }
         }
-        Accepted { reset, feels_wall, sharing, yielding }
+        yielding
     }
 
     /// Records the prescribed conditions that hold bodies from the start, and the bodies that touch.
@@ -129,6 +121,11 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         self.bodies.len() > 1 && touch(&self.particles, &self.grid, supports)
     }
 
+    /// Whether a contact, a prescribed condition outside [`History::constrained`], has active nodes in this step.
+    pub(super) fn feels_wall(&self, prescribed: &[PrescribedDof]) -> bool {
+        self.clock.steps() > 0 && prescribed.iter().any(|dof| !self.history.constrained.contains(&dof.owner))
+    }
+
     /// Whether a body has reached a wall, or in load steps another body. With inertia, also whether a body still feels a wall or touches
     /// another body: without a grid reset, it would never leave.
     fn in_contact(&mut self, supports: &Supports<D>, prescribed: &[PrescribedDof]) -> bool {
@@ -138,8 +135,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             return true;
         }
         if self.settings.scheme.has_inertia() {
-            return prescribed.iter().any(|dof| !self.history.constrained.contains(&dof.owner))
-                || self.bodies_touch(supports);
+            return self.feels_wall(prescribed) || self.bodies_touch(supports);
         }
         self.bodies.len() > 1 && reached_body(&self.particles, &self.history.bonded, &self.grid)
     }
@@ -158,7 +154,6 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         if last.lost_support(prescribed) || last.touching && !self.bodies_touch(supports) {
             return Ok(Pooled::default());
         }
-        let t = if self.settings.scheme.follows_path() { self.path.load } else { self.clock.time() };
-        last.out_of_balance(self.equilibrium(supports, nodal, prescribed, Alphas::START, t).step, prescribed)
+        last.out_of_balance(self.equilibrium(supports, nodal, prescribed, Alphas::START, self.load()).step, prescribed)
     }
 }

@@ -245,15 +245,11 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn with_laws<M: Law>(self, law: impl Fn(&Body<L>) -> M) -> Simulation<D, M, A> {
-        let bodies = self.bodies.iter();
-        let bodies = bodies
-            .map(|body| Body {
-                name: body.name.clone(),
-                law: law(body),
-                density: body.density,
-                dilatation: body.dilatation,
-            })
-            .collect::<Vec<_>>();
+        let with_law = |body: &Body<L>| {
+            let Body { name, law: _, density, dilatation } = body;
+            Body { name: name.clone(), law: law(body), density: *density, dilatation: *dilatation }
+        };
+        let bodies: Vec<_> = self.bodies.iter().map(with_law).collect();
         let mut particles = self.particles;
         particles.set_internal_to_rest(&bodies);
         Simulation {

@@ -76,12 +76,9 @@ impl<const D: usize, L: Law, A: ShapeFunction> NextStep<D, L, A> {
     /// The equilibrium, as a function of φ, at the instant of force balance: the end of the step, except in generalised-α.
     pub fn equilibrium(&self) -> Equilibrium<'_, D, L> {
         let simulation = &self.simulation;
-        let (dt, scheme) = (simulation.clock.step(), &simulation.settings.scheme);
-        let load = match scheme.follows_path() {
-            true => simulation.path.load_step(dt),
-            false => simulation.clock.time() + scheme.instant() * dt,
-        };
-        simulation.equilibrium(&self.supports, &self.nodal, &self.prescribed, scheme.balance(dt), load)
+        let alphas = simulation.settings.scheme.balance(simulation.clock.step());
+        let load = simulation.load_of_balance();
+        simulation.equilibrium(&self.supports, &self.nodal, &self.prescribed, alphas, load)
     }
 
     /// The instant of force balance, as a fraction θ of the step.

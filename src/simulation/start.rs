@@ -92,7 +92,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
                 let nodal = self.project(supports)?;
                 Ok(Nodal { out_of_balance: self.out_of_balance(supports, &nodal, prescribed)?, ..nodal })
             }
-            Some(grid) if grid.motion.len() == nodes => Ok(grid.nodal(self.masses(supports), supports.pool())),
+            Some(grid) if grid.motion.len() == nodes => Ok(Nodal { mass: self.masses(supports).mass, ..grid.clone() }),
             Some(grid) => Err(StepError::OtherGrid { stored: grid.motion.len(), nodes }),
         }
     }

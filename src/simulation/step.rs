@@ -1,7 +1,6 @@
 //! The step on one page: the paper's Algorithm 1.
 
 use super::balance::Balance;
-use super::history::{Accepted, Solved};
 use super::report::Spent;
 use super::{AdvanceError, FailedAttempt, Simulation, StepError, StepReport};
 use crate::approximation::ShapeFunction;
@@ -51,8 +50,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let nodal = projected.with_prescribed(&prescribed).extended(&Unknowns::new(&supports, &prescribed));
         watch.lap(Phase::Projection, supports.passes());
 
-        let Balance { equilibrium, phi, newton, loads: [from, to], straight } =
-            self.balance(&supports, &nodal, &prescribed)?;
+        let Balance { equilibrium, phi, newton, load, straight } = self.balance(&supports, &nodal, &prescribed)?;
         watch.lap(Phase::Newton, supports.passes());
         self.check_tangent(&equilibrium, &phi)?;
         // Forces are in balance at t_n + θ Δt. The motion is extrapolated to t_{n+1}.
@@ -64,13 +62,14 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let mut update = update.extended(&nodal, &equilibrium.unknowns);
         let error = self.local_error(&update, &supports, dt, &newton)?;
         self.smooth_and_check(&mut update, &supports, &nodal)?;
-        let (reactions, work, dissipated) = self.reactions_and_work(&equilibrium, from, dt, &dphi, &update)?;
+        let (reactions, work, dissipated) = self.reactions_and_work(&equilibrium, &dphi, &update)?;
 
         // Nothing fails from here on.
-        let solved = Solved { nodal: &projected, prescribed: &prescribed, dphi: &dphi, reactions: &reactions };
-        let Accepted { reset, feels_wall, sharing, yielding } = self.accept(update, &solved, &supports);
+        let (reset, feels_wall) = (self.history.resets_grid(), self.feels_wall(&prescribed));
+        let yielding = self.accept(update, &projected, &prescribed, &reactions, &supports);
+        let sharing = self.sharing(&supports);
         if scheme.follows_path() {
-            self.path = self.path.after(to, &dphi, dt);
+            self.path = self.path.after(load, &dphi, dt);
         }
         let passes = supports.passes();
         self.store_supports(supports);

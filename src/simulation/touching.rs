@@ -2,9 +2,7 @@
 
 use super::Simulation;
 use crate::approximation::ShapeFunction;
-use crate::grid::{Grid, indices};
 use crate::material::{Law, first_piola, p_wave_modulus};
-use crate::mechanics::loads::PrescribedDof;
 use crate::mechanics::sweep::Supports;
 use crate::tensor::{Tensor, Vector};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -13,7 +11,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 const NO_PART: f64 = 1e-9;
 
 /// Number of cells over which the gap between two bodies is searched.
-const FARTHEST: u64 = 4;
+const FARTHEST: u32 = 4;
 
 /// The mean normal stress across an interface is a tension above this share of the mean stress there.
 const TENSION: f64 = 0.1;
@@ -61,19 +59,9 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn sharing(&self, supports: &Supports<D>) -> Vec<Sharing> {
-        let interfaces = self.interfaces(supports);
-        let of = |(bodies, sides): (&[u32; 2], &Interface)| Sharing {
-            bodies: *bodies,
-            gap: self.gap(sides),
-            tension: self.tension(*bodies, sides),
-        };
-        interfaces.iter().map(of).collect()
-    }
-
-    /// Whether a contact, a prescribed condition outside [`History::constrained`](super::History::constrained), has active nodes in this step.
-    pub(super) fn feels_wall(&self, prescribed: &[PrescribedDof]) -> bool {
-        let begins = self.clock.steps() == 0;
-        !begins && prescribed.iter().any(|dof| !self.history.constrained.contains(&dof.owner))
+        let interfaces = self.interfaces(supports).into_iter();
+        let of = |(bodies, sides)| Sharing { bodies, gap: self.gap(&sides), tension: self.tension(bodies, &sides) };
+        interfaces.map(of).collect()
     }
 
     /// The particles that contribute to nodes of another body, by pairs of bodies.
@@ -85,26 +73,26 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let particles = &self.particles;
         let solid = || (0..particles.len()).filter(|&p| particles.is_solid(p));
         let nodes = |p: usize| supports.of(p).filter(|(_, n, _)| n.abs() > NO_PART).map(|(node, ..)| node);
-        let mut first = vec![u32::MAX; supports.nodes()];
-        let mut several: BTreeMap<usize, BTreeSet<u32>> = BTreeMap::new();
+        // The lowest and the highest body at each node.
+        let mut span = vec![[u32::MAX, 0]; supports.nodes()];
         for p in solid() {
             let own = particles.body[p];
-            for node in nodes(p) {
-                if first[node] == u32::MAX {
-                    first[node] = own;
-                } else if first[node] != own {
-                    several.entry(node).or_insert_with(|| BTreeSet::from([first[node]])).insert(own);
-                }
+            nodes(p).for_each(|node| span[node] = [span[node][0].min(own), span[node][1].max(own)]);
+        }
+        // The particles at nodes of several bodies, body by body.
+        let mut shared: BTreeMap<usize, BTreeMap<u32, Vec<usize>>> = BTreeMap::new();
+        for p in solid() {
+            for node in nodes(p).filter(|&node| span[node][0] < span[node][1]) {
+                shared.entry(node).or_default().entry(particles.body[p]).or_default().push(p);
             }
         }
-        if several.is_empty() {
-            return found;
-        }
-        for p in solid() {
-            let own = particles.body[p];
-            for other in nodes(p).filter_map(|node| several.get(&node)).flatten().filter(|other| **other != own) {
-                let (bodies, side) = ([own.min(*other), own.max(*other)], usize::from(own > *other));
-                found.entry(bodies).or_default()[side].insert(p);
+        for bodies in shared.values() {
+            for (&one, of_one) in bodies {
+                for (&other, of_other) in bodies.range(one + 1..) {
+                    let [lower, upper] = found.entry([one, other]).or_default();
+                    lower.extend(of_one);
+                    upper.extend(of_other);
+                }
             }
         }
         found
@@ -121,17 +109,17 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         }
         let width = |p: usize| particles.present_volume(p).powf(1.0 / D as f64);
         let mut least = f64::INFINITY;
-        for ring in 0..=FARTHEST {
+        for reach in 0..=FARTHEST {
             for &p in one {
                 let x = &particles.position[p];
-                let around = grid.cell(x).into_iter().flat_map(|cell| ring_of(cell, ring, grid));
-                for &q in around.filter_map(|cell| cells.get(&cell)).flatten() {
+                let around = grid.cell(x).into_iter().flat_map(|cell| grid.around(cell, reach));
+                for &q in around.filter_map(|cell| cells.get(&grid.id(cell))).flatten() {
                     let apart = (particles.position[q] - x).norm() - 0.5 * (width(p) + width(q));
                     least = least.min(apart / grid.spacing);
                 }
             }
-            // Particles of outer rings are farther apart, and half of both widths is less than a spacing.
-            if least + 1.0 <= ring as f64 {
+            // Particles farther out are farther apart, and half of both widths is less than a spacing.
+            if least + 1.0 <= f64::from(reach) {
                 break;
             }
         }
@@ -169,18 +157,4 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let [_, mean] = body.averaged(particles.dilatation(p), at.j);
         Some(stress + Tensor::<f64, D>::identity() * mean)
     }
-}
-
-/// The ids of the cells that lie `ring` cells away, the corners of that square or cube included.
-fn ring_of<const D: usize>(cell: [u32; D], ring: u64, grid: &Grid<D>) -> impl Iterator<Item = u64> {
-    let by = move |offset: [u64; D]| {
-        let far = offset.iter().any(|&k| k == 0 || k == 2 * ring);
-        let mut at = [0; D];
-        for k in 0..D {
-            let index = (u64::from(cell[k]) + offset[k]).checked_sub(ring)?;
-            at[k] = u32::try_from(index).ok().filter(|&index| index < grid.cells[k])?;
-        }
-        far.then(|| grid.id(at))
-    };
-    indices([2 * ring + 1; D]).filter_map(by)
 }

@@ -18,12 +18,11 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     pub(super) fn reactions_and_work(
         &self,
         balanced: &Equilibrium<'_, D, L>,
-        t: f64,
-        dt: f64,
         dphi: &[Vector<f64, D>],
         update: &Update<'_, D>,
     ) -> Result<(Vec<Reaction<D>>, f64, f64), StepError> {
         let (terms::Step { supports, nodal, .. }, phi) = (balanced.step, update.motion());
+        let (t, dt) = (self.load(), self.clock.step());
         let mut end = balanced;
         let after;
         if self.settings.scheme.instant() < 1.0 {

@@ -1,7 +1,7 @@
 //! Preconditioned conjugate gradients (Saad, Iterative Methods for Sparse Linear Systems, 2nd ed., alg. 9.1).
 
 use super::vector::{axpy, dot, norm, xpby};
-use super::{InvalidSetting, LinearError, LinearOperator, LinearOutcome, LinearReport, begin, finite, true_residual};
+use super::{LinearError, LinearOperator, LinearOutcome, LinearReport, begin, finite, true_residual};
 use crate::pooled::{Pool, Pooled};
 
 /// A curvature below this multiple of eps times the largest curvature so far is round-off in size and sign.
@@ -17,12 +17,6 @@ pub struct ConjugateGradientSettings {
     pub relative_tolerance: f64,
     /// Iterations allowed.
     pub max_iterations: usize,
-}
-
-impl Default for ConjugateGradientSettings {
-    fn default() -> Self {
-        Self { relative_tolerance: 1e-8, max_iterations: 1000 }
-    }
 }
 
 /// Solves A x = b from x = 0 for symmetric positive A and M.
@@ -56,7 +50,8 @@ impl Default for ConjugateGradientSettings {
 ///
 /// // Forces in balance pull the masses apart. Of all solutions x₁ − x₀ = 3, the shortest is found.
 /// let mut x = [0.0; 2];
-/// let report = conjugate_gradient(&Spring, &Identity, &[-3.0, 3.0], &mut x, &ConjugateGradientSettings::default(), &Pool::default())?;
+/// let settings = ConjugateGradientSettings { relative_tolerance: 1e-8, max_iterations: 10 };
+/// let report = conjugate_gradient(&Spring, &Identity, &[-3.0, 3.0], &mut x, &settings, &Pool::default())?;
 /// assert!(report.converged());
 /// assert_eq!(x, [-1.5, 1.5]);
 /// # Ok::<(), bfree::solver::LinearError>(())
@@ -72,8 +67,7 @@ pub fn conjugate_gradient(
     settings: &ConjugateGradientSettings,
     workspace: &Pool,
 ) -> Result<LinearReport, LinearError> {
-    InvalidSetting::check_tolerance("relative_tolerance", settings.relative_tolerance)?;
-    let (mut report, b_norm) = begin(rhs, solution)?;
+    let (mut report, b_norm) = begin(rhs, solution, settings.relative_tolerance)?;
     if b_norm == 0.0 {
         return Ok(report);
     }
@@ -81,70 +75,53 @@ pub fn conjugate_gradient(
     let mut r = workspace.collect(rhs.iter().copied());
     let mut r_norm = b_norm;
     loop {
-        let allowed = settings.max_iterations - report.iterations.min(settings.max_iterations);
-        let run = descend(operator, preconditioner, &mut r, r_norm, target, solution, allowed)
-            .map_err(|error| error.after(report.iterations))?;
-        report.iterations += run.iterations;
-        report.products += run.products + 1;
-        finite(norm(solution), "the norm of the solution", report.iterations)?;
-        let reached =
-            finite(true_residual(operator, rhs, solution, &mut r), "the norm of the residual", report.iterations)?;
+        let ended = descend(operator, preconditioner, &mut r, target, solution, settings.max_iterations, &mut report)?;
+        let reached = true_residual(operator, rhs, solution, &mut r, &mut report)?;
         report.relative_residual = reached / b_norm;
-        report.outcome = if reached <= target {
-            LinearOutcome::Converged
-        } else if run.outcome != LinearOutcome::Converged {
-            run.outcome
-        } else if reached < 0.5 * r_norm {
+        report.outcome = match ended {
+            _ if reached <= target => LinearOutcome::Converged,
             // The residual of the recurrence has drifted, but the true residual still improves.
-            r_norm = reached;
-            continue;
-        } else {
-            LinearOutcome::Stagnated
+            LinearOutcome::Converged if reached < 0.5 * r_norm => {
+                r_norm = reached;
+                continue;
+            }
+            LinearOutcome::Converged => LinearOutcome::Stagnated,
+            _ => ended,
         };
         return Ok(report);
     }
 }
 
-/// The outcome and the counts of one run of the recurrence.
-struct Run {
-    outcome: LinearOutcome,
-    iterations: usize,
-    products: usize,
-}
-
-/// Steps 1 to 4 from the residual `r` of norm `r_norm`; leaves the best iterate in `solution`.
+/// Steps 1 to 4 from the residual `r`, counted in `report`. Leaves the best iterate in `solution`.
 fn descend(
     operator: &dyn LinearOperator,
     preconditioner: &dyn LinearOperator,
     r: &mut Pooled<f64>,
-    r_norm: f64,
     target: f64,
     solution: &mut [f64],
-    allowed: usize,
-) -> Result<Run, LinearError> {
-    let n = r.len();
+    max_iterations: usize,
+    report: &mut LinearReport,
+) -> Result<LinearOutcome, LinearError> {
     let mut x = r.pool().collect(solution.iter().copied());
-    let (mut z, mut q) = (r.pool().filled(n, 0.0), r.pool().filled(n, 0.0));
+    let (mut z, mut q) = (r.pool().filled(r.len(), 0.0), r.pool().filled(r.len(), 0.0));
     preconditioner.apply(r, &mut z);
     let mut p = z.clone();
     let mut rz = dot(r, &z);
     // p·Mp, by recurrence: Mp = r + β Mp_old and z·Mp_old = r·p_old = 0.
     let mut p_m_p = rz;
     let mut largest: f64 = 0.0;
-    let (mut best, mut best_at) = (r_norm, 0);
-    let mut run = Run { outcome: LinearOutcome::Converged, iterations: 0, products: 0 };
+    let (mut best, mut best_at) = (norm(r), report.iterations);
     loop {
-        let at = run.iterations;
-        if let Some(outcome) = ends(at, allowed, at - best_at > n + PATIENCE, finite(rz, "r·z", at)?) {
-            return Ok(Run { outcome, ..run });
+        let at = report.iterations;
+        if let Some(outcome) = ends(finite(rz, "r·z", at)?, at >= max_iterations, at - best_at > r.len() + PATIENCE) {
+            return Ok(outcome);
         }
         operator.apply(&p, &mut q);
-        run.products += 1;
+        report.products += 1;
         let p_a_p = finite(dot(&p, &q), "p·Ap", at)?;
         let curvature = p_a_p / p_m_p;
         mutant!("solver: negative curvature counts as positive": curvature = curvature.abs());
-        largest = largest.max(curvature);
-        if let Some(outcome) = unusable(curvature, largest) {
+        if let Some(outcome) = unusable(curvature, &mut largest) {
             if outcome == LinearOutcome::NegativeCurvature {
                 if x.iter().all(|x| *x == 0.0) {
                     // The step length for a curvature of the opposite sign.
@@ -152,19 +129,18 @@ fn descend(
                 }
                 solution.copy_from_slice(&x);
             }
-            return Ok(Run { outcome, ..run });
+            return Ok(outcome);
         }
         // α = r·z / p·Ap
-        let length = rz / p_a_p;
-        axpy(length, &p, &mut x);
-        axpy(-length, &q, r);
-        run.iterations += 1;
+        axpy(rz / p_a_p, &p, &mut x);
+        axpy(-rz / p_a_p, &q, r);
+        report.iterations += 1;
         let r_norm = finite(norm(r), "the norm of the residual", at)?;
         if r_norm < best {
-            (best, best_at) = (r_norm, run.iterations);
+            (best, best_at) = (r_norm, report.iterations);
             solution.copy_from_slice(&x);
             if r_norm <= target {
-                return Ok(run);
+                return Ok(LinearOutcome::Converged);
             }
         }
         preconditioner.apply(r, &mut z);
@@ -178,27 +154,22 @@ fn descend(
 }
 
 /// The outcome before a product, if the recurrence ends there.
-fn ends(iterations: usize, allowed: usize, no_progress: bool, rz: f64) -> Option<LinearOutcome> {
-    if iterations >= allowed {
-        Some(LinearOutcome::IterationLimit)
-    } else if no_progress {
-        Some(LinearOutcome::Stagnated)
-    } else if rz <= 0.0 {
-        Some(LinearOutcome::NegativeCurvature)
-    } else {
-        None
+fn ends(rz: f64, used_up: bool, no_progress: bool) -> Option<LinearOutcome> {
+    match (used_up, no_progress) {
+        (true, _) => Some(LinearOutcome::IterationLimit),
+        (_, true) => Some(LinearOutcome::Stagnated),
+        _ => (rz <= 0.0).then_some(LinearOutcome::NegativeCurvature),
     }
 }
 
-/// The outcome at a curvature p·Ap / p·Mp that gives no step: negative, or zero to round-off.
-fn unusable(curvature: f64, largest: f64) -> Option<LinearOutcome> {
-    let unresolved = UNRESOLVED * f64::EPSILON * largest;
+/// The outcome at a curvature p·Ap / p·Mp that gives no step: negative, or zero to round-off. Updates the largest curvature so far.
+fn unusable(curvature: f64, largest: &mut f64) -> Option<LinearOutcome> {
+    *largest = largest.max(curvature);
+    let unresolved = UNRESOLVED * f64::EPSILON * *largest;
     if curvature < -unresolved {
         Some(LinearOutcome::NegativeCurvature)
-    } else if curvature <= unresolved {
-        Some(LinearOutcome::Stagnated)
     } else {
-        None
+        (curvature <= unresolved).then_some(LinearOutcome::Stagnated)
     }
 }
 

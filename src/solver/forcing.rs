@@ -33,15 +33,6 @@ impl Default for Forcing {
     }
 }
 
-/// The data of the last iteration that determine the next forcing term.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Progress {
-    /// The last forcing term.
-    pub forcing: f64,
-    /// The last ‖R_k‖ / ‖R_k₋₁‖.
-    pub ratio: f64,
-}
-
 impl Forcing {
     pub(super) fn check(self) -> Result<(), InvalidSetting> {
         match self {
@@ -52,16 +43,17 @@ impl Forcing {
         }
     }
 
-    /// The next forcing term. `wanted` is the residual norm that ends Newton's iteration, divided by the present one.
-    pub(super) fn next(self, last: Option<Progress>, wanted: f64) -> f64 {
+    /// The next forcing term. `last` is the last one, with the ‖R_k‖ / ‖R_k₋₁‖ that it led to. `wanted` is the residual norm that ends
+    /// Newton's iteration, divided by the present one.
+    pub(super) fn next(self, last: Option<(f64, f64)>, wanted: f64) -> f64 {
         match self {
             Self::Fixed(η) => η,
             Self::EisenstatWalker => {
                 // η = γ (‖R_k‖ / ‖R_k₋₁‖)²
-                let choice = last.map_or(FIRST, |last| {
-                    let limit = GAMMA * last.forcing * last.forcing;
-                    let η = GAMMA * last.ratio * last.ratio;
-                    mutant!("solver: forcing by the ratio of residuals, not its square": η = GAMMA * last.ratio);
+                let choice = last.map_or(FIRST, |(forcing, ratio)| {
+                    let limit = GAMMA * forcing * forcing;
+                    let η = GAMMA * ratio * ratio;
+                    mutant!("solver: forcing by the ratio of residuals, not its square": η = GAMMA * ratio);
                     if limit > SAFEGUARD { η.max(limit) } else { η }
                 });
                 // Half of the remaining reduction is enough (Kelley 1995, eq. 6.20).
@@ -77,7 +69,7 @@ mod tests {
 
     #[test]
     fn choice_two_tightens_with_the_residual_and_not_too_fast() {
-        let next = |forcing, ratio, wanted| Forcing::EisenstatWalker.next(Some(Progress { forcing, ratio }), wanted);
+        let next = |forcing, ratio, wanted| Forcing::EisenstatWalker.next(Some((forcing, ratio)), wanted);
         assert_eq!(Forcing::EisenstatWalker.next(None, 0.0), 0.5);
         assert_eq!(next(0.1, 0.1, 0.0), 0.9 * 0.1 * 0.1);
         // After a loose step, γ η² = 0.225 limits the fall of the next term.
@@ -86,7 +78,7 @@ mod tests {
         assert_eq!(next(0.5, 7.0, 0.0), 0.9);
         // Near the end the term is no tighter than needed.
         assert_eq!(next(0.01, 1e-4, 0.02), 0.01);
-        assert_eq!(Forcing::Fixed(1e-8).next(Some(Progress { forcing: 0.5, ratio: 0.5 }), 0.5), 1e-8);
+        assert_eq!(Forcing::Fixed(1e-8).next(Some((0.5, 0.5)), 0.5), 1e-8);
     }
 
     #[test]

@@ -216,7 +216,7 @@ impl LinearReport {
     ///     }
     /// }
     ///
-    /// let settings = ConjugateGradientSettings::default();
+    /// let settings = ConjugateGradientSettings { relative_tolerance: 1e-8, max_iterations: 10 };
     /// let report = conjugate_gradient(&Mirror, &Identity, &[1.0, 2.0], &mut [0.0; 2], &settings, &Pool::default())?;
     /// assert!(!report.converged());
     /// assert_eq!(report.outcome, LinearOutcome::NegativeCurvature);
@@ -266,16 +266,6 @@ pub enum LinearError {
     },
 }
 
-impl LinearError {
-    /// This error with `earlier` iterations added to its iteration number.
-    fn after(self, earlier: usize) -> Self {
-        match self {
-            Self::NotFinite { what, iteration } => Self::NotFinite { what, iteration: iteration + earlier },
-            other => other,
-        }
-    }
-}
-
 /// A setting outside its range.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("{name} is {value:e}; it must be {allowed}")]
@@ -296,17 +286,14 @@ impl InvalidSetting {
     fn check_tolerance(name: &'static str, value: f64) -> Result<(), Self> {
         Self::check((0.0..1.0).contains(&value), name, value, "at least 0 and less than 1")
     }
-
-    fn check_restart(restart: usize) -> Result<(), Self> {
-        Self::check(restart >= 1, "restart", restart as f64, "at least 1")
-    }
 }
 
 /// Sets the solution to 0. Returns the report of no iterations, and ‖b‖.
 ///
 /// # Errors
-/// The lengths differ, or the right-hand side is not finite.
-fn begin(rhs: &[f64], solution: &mut [f64]) -> Result<(LinearReport, f64), LinearError> {
+/// The tolerance is out of range, the lengths differ, or the right-hand side is not finite.
+fn begin(rhs: &[f64], solution: &mut [f64], relative_tolerance: f64) -> Result<(LinearReport, f64), LinearError> {
+    InvalidSetting::check_tolerance("relative_tolerance", relative_tolerance)?;
     if rhs.len() != solution.len() {
         return Err(LinearError::Length { rhs: rhs.len(), solution: solution.len() });
     }
@@ -320,11 +307,22 @@ fn finite(value: f64, what: &'static str, iteration: usize) -> Result<f64, Linea
     if value.is_finite() { Ok(value) } else { Err(LinearError::NotFinite { what, iteration }) }
 }
 
-/// `r = b − A x`, and its norm.
-fn true_residual(operator: &dyn LinearOperator, rhs: &[f64], x: &[f64], r: &mut [f64]) -> f64 {
+/// `r = b − A x`, and its norm. Counts the product.
+///
+/// # Errors
+/// x or r is not finite.
+fn true_residual(
+    operator: &dyn LinearOperator,
+    rhs: &[f64],
+    x: &[f64],
+    r: &mut [f64],
+    report: &mut LinearReport,
+) -> Result<f64, LinearError> {
+    finite(vector::norm(x), "the norm of the solution", report.iterations)?;
     operator.apply(x, r);
+    report.products += 1;
     vector::xpby(rhs, -1.0, r);
-    vector::norm(r)
+    finite(vector::norm(r), "the norm of the residual", report.iterations)
 }
 
 #[cfg(test)]

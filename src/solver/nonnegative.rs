@@ -14,26 +14,22 @@ pub(crate) struct NonnegativeLeastSquares {
     sizes: Vec<f64>,
     /// b − A x
     rest: DVector<f64>,
-    /// The free columns, with x > 0, and their x.
-    free: Vec<usize>,
-    x: Vec<f64>,
-    /// The factors Q R of the free columns: the columns of Q, and the columns of R down to its diagonal.
-    q: Vec<DVector<f64>>,
-    r: Vec<Vec<f64>>,
+    free: Vec<Free>,
+}
+
+/// A free column, with x > 0, and its columns of the factors Q R of the free columns.
+struct Free {
+    column: usize,
+    x: f64,
+    q: DVector<f64>,
+    /// Down to the diagonal.
+    r: Vec<f64>,
 }
 
 impl NonnegativeLeastSquares {
     /// A problem without columns: x = 0.
     pub(crate) fn new(b: DVector<f64>) -> Self {
-        Self {
-            columns: Vec::new(),
-            sizes: Vec::new(),
-            rest: b,
-            free: Vec::new(),
-            x: Vec::new(),
-            q: Vec::new(),
-            r: Vec::new(),
-        }
+        Self { columns: Vec::new(), sizes: Vec::new(), rest: b, free: Vec::new() }
     }
 
     /// Adds a column of A, which must not be 0.
@@ -45,13 +41,12 @@ impl NonnegativeLeastSquares {
 
     /// The columns with x > 0, numbered in the order they were offered, and their x.
     pub(crate) fn solution(&self) -> impl Iterator<Item = (usize, f64)> {
-        self.free.iter().zip(&self.x).map(|(&column, x)| (column, x / self.sizes[column]))
+        self.free.iter().map(|free| (free.column, free.x / self.sizes[free.column]))
     }
 
     /// Solves with all offered columns, from the last solution, until |A x − b| ≤ `least`. Returns |A x − b|.
     pub(crate) fn solve(&mut self, least: f64) -> f64 {
-        let mut refused = vec![false; self.columns.len()];
-        self.free.iter().for_each(|&column| refused[column] = true);
+        let mut refused = self.are_free();
         // Each step lowers |A x − b| in exact arithmetic. The limit guards against round-off.
         for _ in 0..10 * self.rest.len() {
             if self.rest.norm() <= least {
@@ -64,22 +59,28 @@ impl NonnegativeLeastSquares {
                 break;
             }
             refused[best] = true;
-            if self.free_one(best) && self.descend() {
+            if self.free_one(best, 0.0) && self.descend() {
                 // The column is free now, so columns refused before may be of use.
-                refused.fill(false);
-                self.free.iter().for_each(|&column| refused[column] = true);
+                refused = self.are_free();
             }
         }
         self.rest.norm()
     }
 
-    /// Frees a column; `false` if it depends on the free columns.
-    fn free_one(&mut self, column: usize) -> bool {
+    /// Whether each offered column is free.
+    fn are_free(&self) -> Vec<bool> {
+        let mut are_free = vec![false; self.columns.len()];
+        self.free.iter().for_each(|free| are_free[free.column] = true);
+        are_free
+    }
+
+    /// Frees a column with this x; `false` if the column depends on the free columns.
+    fn free_one(&mut self, column: usize, x: f64) -> bool {
         let mut direction = self.columns[column].clone();
-        let mut above = vec![0.0; self.q.len()];
+        let mut r = vec![0.0; self.free.len()];
         // Gram–Schmidt; twice is enough.
         for _ in 0..2 {
-            for (q, r) in self.q.iter().zip(&mut above) {
+            for (Free { q, .. }, r) in self.free.iter().zip(&mut r) {
                 let along = q.dot(&direction);
                 direction.axpy(-along, q, 1.0);
                 *r += along;
@@ -89,62 +90,48 @@ impl NonnegativeLeastSquares {
         if left <= INDEPENDENT {
             return false;
         }
-        above.push(left);
-        self.q.push(direction / left);
-        self.r.push(above);
-        self.free.push(column);
-        self.x.push(0.0);
+        r.push(left);
+        self.free.push(Free { column, x, q: direction / left, r });
         true
     }
 
     /// Moves x to the least-squares solution over the free columns. A column whose x would become negative on the way is bound.
     /// `false` if the newest column is bound too.
     fn descend(&mut self) -> bool {
-        let newest = self.free.last().copied();
+        let newest = self.free.last().map(|free| free.column);
         while !self.free.is_empty() {
             let step = self.step();
-            let falls = |(i, (x, step)): (usize, (&f64, &f64))| (x + step <= 0.0).then(|| (i, -x / step));
-            let first = self.x.iter().zip(&step).enumerate().filter_map(falls).min_by(|a, b| a.1.total_cmp(&b.1));
+            let falls = |(i, (free, step)): (usize, (&Free, &f64))| (free.x + step <= 0.0).then(|| (i, -free.x / step));
+            let first = self.free.iter().zip(&step).enumerate().filter_map(falls).min_by(|a, b| a.1.total_cmp(&b.1));
             mutant!("solver: non-negative least squares step below zero": first = first.filter(|_| false));
             let length = first.map_or(1.0, |(_, length)| length);
-            for ((x, step), &column) in self.x.iter_mut().zip(&step).zip(&self.free) {
-                *x += length * step;
-                self.rest.axpy(-length * step, &self.columns[column], 1.0);
+            for (free, step) in self.free.iter_mut().zip(&step) {
+                free.x += length * step;
+                self.rest.axpy(-length * step, &self.columns[free.column], 1.0);
             }
             let Some((bound, _)) = first else { break };
             self.bind(bound);
         }
-        self.free.last().copied() == newest
+        self.free.last().map(|free| free.column) == newest
     }
 
     /// R⁻¹ Qᵀ (b − A x)
     fn step(&self) -> Vec<f64> {
-        let mut step: Vec<f64> = self.q.iter().map(|q| q.dot(&self.rest)).collect();
-        for k in (0..step.len()).rev() {
-            step[k] /= self.r[k][k];
+        let mut step: Vec<f64> = self.free.iter().map(|free| free.q.dot(&self.rest)).collect();
+        for (k, Free { r, .. }) in self.free.iter().enumerate().rev() {
+            step[k] /= r[k];
             for i in 0..k {
-                step[i] -= self.r[k][i] * step[k];
+                step[i] -= r[i] * step[k];
             }
         }
         step
     }
 
-    /// Binds the free column at `place`: x = 0.
+    /// Binds the free column at `place`: x = 0. The free columns after it get new factors.
     fn bind(&mut self, place: usize) {
-        let gone = self.free.remove(place);
-        let x = self.x.remove(place);
-        self.rest.axpy(x, &self.columns[gone], 1.0);
-        let after = self.free.split_off(place);
-        let values = self.x.split_off(place);
-        self.q.truncate(place);
-        self.r.truncate(place);
-        for (column, value) in after.into_iter().zip(values) {
-            if self.free_one(column) {
-                if let Some(x) = self.x.last_mut() {
-                    *x = value;
-                }
-            } else {
-                self.rest.axpy(value, &self.columns[column], 1.0);
+        for (i, Free { column, x, .. }) in self.free.split_off(place).into_iter().enumerate() {
+            if i == 0 || !self.free_one(column, x) {
+                self.rest.axpy(x, &self.columns[column], 1.0);
             }
         }
     }

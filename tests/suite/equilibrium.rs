@@ -164,7 +164,7 @@ impl<const D: usize> Cloud<D> {
 
 fn mismatch(result: Result<(), CheckError>) -> Result<TangentMismatch, Failure> {
     match result {
-        Err(CheckError::Mismatch(mismatch)) => Ok(*mismatch),
+        Err(CheckError::Mismatch(mismatch)) => Ok(mismatch),
         other => Err(format!("no mismatch, but {other:?}").into()),
     }
 }

@@ -28,9 +28,11 @@ impl<L: Law> Point<L> {
 
     /// The Kirchhoff stress at the end of a step to F.
     fn step<const D: usize>(&mut self, f: Tensor<f64, D>, dt: f64) -> Tensor<f64, D> {
+        let mut next = self.internal.clone();
         let at = MaterialState::new(f - identity()).in_step(dt, &self.internal);
         let stress = f * self.law.stress(&at) * f.transpose();
-        self.internal = self.law.updated_variables(&at);
+        self.law.update_variables(&at, &mut next);
+        self.internal = next;
         stress
     }
 

@@ -70,8 +70,10 @@ impl Law for Softening {
         scaled(&(self.solid.elasticity(at, x) - softer), Self::factor(met))
     }
 
-    fn updated_variables<const D: usize>(&self, at: &MaterialState<f64, D>) -> Vec<f64> {
-        if self.softens { vec![self.met(at).0, at.internal[1] + at.dt] } else { at.internal.to_vec() }
+    fn update_variables<const D: usize>(&self, at: &MaterialState<f64, D>, variables: &mut [f64]) {
+        if self.softens {
+            variables.copy_from_slice(&[self.met(at).0, at.internal[1] + at.dt]);
+        }
     }
 }
 

@@ -160,14 +160,14 @@ fn compare<const D: usize>() {
         let zeros = vec![Vector::zeros(); u.len()];
         let assembled = |supports: &Supports<D>| {
             let mut out = zeros.clone();
-            supports.assemble(&u, &mut out, point).unwrap();
+            supports.assemble(&u, Weights::Signed, &mut out, point).unwrap();
             out
         };
         let worst = difference(&assembled(&fast), &assembled(&plain));
         assert!(worst < 1e-12, "{D}D {shape:?}: assembled {worst:e}");
         let magnitudes = |supports: &Supports<D>| {
             let mut out = zeros.clone();
-            supports.assemble_magnitudes(&u, &mut out, point).unwrap();
+            supports.assemble(&u, Weights::Magnitude, &mut out, point).unwrap();
             out
         };
         let worst = difference(&magnitudes(&fast), &magnitudes(&plain));
@@ -180,8 +180,8 @@ fn compare<const D: usize>() {
         let duals = |supports: &Supports<D>| {
             // Sums that are added to nonzero output.
             let (mut out, mut real) = (seeded.clone(), u.clone());
-            supports.assemble(&seeded, &mut out, square).unwrap();
-            supports.assemble(&u, &mut real, square).unwrap();
+            supports.assemble(&seeded, Weights::Signed, &mut out, square).unwrap();
+            supports.assemble(&u, Weights::Signed, &mut real, square).unwrap();
             let same = out.iter().flatten().zip(real.iter().flatten()).all(|(a, b)| a.re.to_bits() == b.to_bits());
             assert!(same, "{D}D {shape:?}: the real part of dual numbers");
             out.iter().map(|x| x.map(|x| x.eps)).collect::<Vec<_>>()
@@ -310,7 +310,7 @@ fn renewal<const D: usize>() {
 
 fn sums<const D: usize>(supports: &Supports<D>, u: &[Vector<f64, D>]) -> Vec<Vector<f64, D>> {
     let mut out = vec![Vector::zeros(); u.len()];
-    supports.assemble(u, &mut out, |_, u, l| Ok::<_, Infallible>((u, l))).unwrap();
+    supports.assemble(u, Weights::Signed, &mut out, |_, u, l| Ok::<_, Infallible>((u, l))).unwrap();
     out
 }
 
@@ -329,7 +329,7 @@ fn the_first_particle_that_fails_is_named() {
         let u = field::<2>(&nodes);
         let mut out = vec![Vector::zeros(); u.len()];
         let fails = |p: usize, u, l| if p % 100 == 77 { Err(p) } else { Ok((u, l)) };
-        assert_eq!(fast.assemble(&u, &mut out, fails), Err(77));
+        assert_eq!(fast.assemble(&u, Weights::Signed, &mut out, fails), Err(77));
         assert_eq!(fast.interpolate(&u, |p, _, _: Tensor<f64, 2>| if p > 99 { Err(p) } else { Ok(()) }), Err(100));
     }
     positions[300][1] = f64::NAN;

@@ -12,7 +12,7 @@ use bfree::simulation::{InitialGuess, Simulation, StepError};
 use bfree::tensor::Vector;
 
 /// The parts of the equilibrium of the next step.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Prepared<const D: usize> {
     /// Shape functions at x_n.
     pub supports: Supports<D>,

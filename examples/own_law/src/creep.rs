@@ -102,18 +102,16 @@ impl Law for Creep {
         Tensor::from_fn(|i, k| stress[(i, k)])
     }
 
-    fn updated_variables<const D: usize>(&self, at: &MaterialState<f64, D>) -> Vec<f64> {
+    fn update_variables<const D: usize>(&self, at: &MaterialState<f64, D>, variables: &mut [f64]) {
         let Crept { trial, q: [q_trial, q], .. } = self.crept(at);
-        let mut next = at.internal.to_vec();
         if q_trial > 0.0 {
             let delta_p = (q_trial - q) / (3.0 * self.shear);
-            next[0] += delta_p;
-            next[1] += q * delta_p;
-            for (next, place) in next[2..].iter_mut().zip(PLACES) {
-                *next += (1.0 - q / q_trial) * trial[place];
+            variables[0] += delta_p;
+            variables[1] += q * delta_p;
+            for (crept, place) in variables[2..].iter_mut().zip(PLACES) {
+                *crept += (1.0 - q / q_trial) * trial[place];
             }
         }
-        next
     }
 }
 
@@ -145,7 +143,9 @@ mod tests {
             for _ in 0..steps {
                 let at = sheared.in_step(dt, &internal);
                 stress = LAW.stress(&at);
-                internal = LAW.updated_variables(&at);
+                let mut next = internal.clone();
+                LAW.update_variables(&at, &mut next);
+                internal = next;
             }
             let q_0 = q(&LAW.stress(&sheared.in_step(0.0, &[0.0; 8])));
             let closed = (q_0.powi(-2) + 2.0 * 3.0 * LAW.shear * LAW.rate / LAW.stress.powi(3)).powf(-0.5);

@@ -10,7 +10,7 @@ use crate::lanes::{LANES, Lanes, WithLanes, widest};
 use crate::material::{ClosedTangent, Law, LawVisitor, Material, MaterialState, NonPositiveJacobian};
 use crate::mechanics::sweep::{At, Group, Number};
 use crate::particles::{Body, Particles};
-use crate::scalar::{Real, Single};
+use crate::scalar::Real;
 use crate::tensor::{Tensor, identity};
 use std::any::Any;
 
@@ -32,7 +32,7 @@ type Rows<T> = [[T; LANES]; 9];
 type ClosedRows = [[f64; LANES]; Form::ClosedWithBoth.rows(3)];
 
 /// The states of the particles of a group, a lane each. Empty lanes hold zeros.
-pub struct States<'a, T> {
+struct States<'a, T> {
     /// ∇u
     gradient: Rows<T>,
     h_r: Rows<f64>,
@@ -74,45 +74,8 @@ impl<'a, T: Real> States<'a, T> {
     }
 }
 
-/// The loop over the lanes of one law. It fills rows and det F.
-pub(crate) type Loop<'l, T> = dyn Fn(&States<'_, T>, &mut [[T; LANES]], &mut [f64; LANES]) + Sync + 'l;
-
-/// The loop over the lanes for each body.
-struct Chosen<'a, T> {
-    body: &'a [u32],
-    ids: &'a [u32],
-    loops: Vec<Box<Loop<'a, T>>>,
-}
-
-impl<T: Real> Chosen<'_, T> {
-    /// Evaluates every law that occurs in the group for all lanes, and keeps the lanes of its own particles.
-    ///
-    /// # Errors
-    /// The particle with the smallest id among those with det F ≤ 0.
-    fn evaluate(&self, group: &[u32], states: &States<'_, T>, out: &mut [[T; LANES]]) -> Result<(), Inadmissible> {
-        let mut det_f = [1.0; LANES];
-        let body = |lane: usize| self.body[group[lane] as usize];
-        self.loops[body(0) as usize](states, out, &mut det_f);
-        for lane in 1..group.len() {
-            if (0..lane).any(|before| body(before) == body(lane)) {
-                continue;
-            }
-            let (mut other, mut other_det_f) = (vec![[T::zero(); LANES]; out.len()], [1.0; LANES]);
-            self.loops[body(lane) as usize](states, &mut other, &mut other_det_f);
-            mutant!("sweep: a second body in a group takes the law of the first": { self.loops[body(0) as usize](states, &mut other, &mut other_det_f); });
-            for same in (lane..group.len()).filter(|&same| body(same) == body(lane)) {
-                det_f[same] = other_det_f[same];
-                out.iter_mut().zip(&other).for_each(|(out, other)| out[same] = other[same]);
-            }
-        }
-        let check = |(&p, &det_f): (&u32, &f64)| {
-            let error = NonPositiveJacobian::check(det_f).err();
-            error.map(|source| Inadmissible { particle: self.ids[p as usize] as usize, source })
-        };
-        let first = group.iter().zip(&det_f).filter_map(check).min_by_key(|error| error.particle);
-        first.map_or(Ok(()), Err)
-    }
-}
+/// The evaluation of one law in all lanes. It fills rows and det F.
+type Evaluation<'l, T> = dyn Fn(&States<'_, T>, &mut [[T; LANES]], &mut [f64; LANES]) + Sync + 'l;
 
 impl<const D: usize, L: Law> Laws<'_, D, L> {
     /// The point function that adds σ = V₀ F S F_rᵀ at ∇u, for one pass. Only the F of `part` carry derivatives.
@@ -122,17 +85,16 @@ impl<const D: usize, L: Law> Laws<'_, D, L> {
     ) -> impl Fn(Group<'_>, &At<T, D, D>, &mut At<T, D, D>) -> Result<(), Inadmissible> + Sync {
         // The loops of shipped laws are compiled for plain numbers. `downcast` finds out whether T is the plain number.
         let in_lanes = |law: &L| {
-            let shipped: Box<dyn Any> = Box::new(shipped(material(law)?, D, What::Stresses));
-            shipped.downcast::<Box<Loop<'static, T>>>().ok()
+            let shipped: Box<dyn Any> = Box::new(shipped(material(law)?, D, Quantity::Stress));
+            shipped.downcast::<Box<Evaluation<'static, T>>>().ok()
         };
-        let chosen = self.chosen(|law| match in_lanes(law) {
+        let of_body = self.evaluations(|law| match in_lanes(law) {
             Some(shipped) => *shipped,
             None => Box::new(move |states, out, det_f| stresses_of::<L, T, D>(law, states, part, out, det_f)),
         });
         move |group, at, sums| {
-            let states = States::of(self.particles, self.dt, group.particles, at.gradient.as_flattened());
             let mut stresses = [[[T::zero(); LANES]; D]; D];
-            chosen.evaluate(group.particles, &states, stresses.as_flattened_mut())?;
+            self.evaluate(&of_body, group, at, stresses.as_flattened_mut())?;
             for (sums, rows) in sums.gradient.as_flattened_mut().iter_mut().zip(stresses.as_flattened()) {
                 sums.iter_mut().zip(rows).for_each(|(sum, &x)| *sum += x);
             }
@@ -151,22 +113,53 @@ impl<const D: usize, L: Law> Laws<'_, D, L> {
         part: Part,
         form: Form,
     ) -> impl Fn(Group<'_>, &At<f64, D, D>, &mut [[f64; LANES]]) -> Result<(), Inadmissible> + Sync {
-        let chosen = self.chosen(move |law| match material(law) {
+        let of_body = self.evaluations(move |law| match material(law) {
             Some(material) if part == Part::Whole && form != Form::General => {
-                shipped(material, D, What::Tangents(form))
+                shipped(material, D, Quantity::Tangent(form))
             }
             _ => Box::new(move |states, out, det_f| tangents_of::<L, D>(law, states, part, form, out, det_f)),
         });
-        move |group, at, rows| {
-            let states = States::of(self.particles, self.dt, group.particles, at.gradient.as_flattened());
-            chosen.evaluate(group.particles, &states, rows)
-        }
+        move |group, at, rows| self.evaluate(&of_body, group, at, rows)
     }
 
-    /// The loops that `choose` picks for the law of each body.
-    fn chosen<'s, T: Real>(&'s self, choose: impl Fn(&'s L) -> Box<Loop<'s, T>>) -> Chosen<'s, T> {
-        let Particles { body, id, .. } = self.particles;
-        Chosen { body, ids: id, loops: self.bodies.iter().map(|body| choose(&body.law)).collect() }
+    /// The evaluations that `choose` picks for the law of each body.
+    fn evaluations<'s, T>(&'s self, choose: impl Fn(&'s L) -> Box<Evaluation<'s, T>>) -> Vec<Box<Evaluation<'s, T>>> {
+        self.bodies.iter().map(|body| choose(&body.law)).collect()
+    }
+
+    /// Evaluates every law that occurs in the group for all lanes, and keeps the lanes of its own particles.
+    ///
+    /// # Errors
+    /// The particle with the smallest id among those with det F ≤ 0.
+    fn evaluate<T: Real>(
+        &self,
+        of_body: &[Box<Evaluation<'_, T>>],
+        group: Group<'_>,
+        at: &At<T, D, D>,
+        out: &mut [[T; LANES]],
+    ) -> Result<(), Inadmissible> {
+        let (group, mut det_f) = (group.particles, [1.0; LANES]);
+        let states = States::of(self.particles, self.dt, group, at.gradient.as_flattened());
+        let body = |lane: usize| self.particles.body[group[lane] as usize];
+        of_body[body(0) as usize](&states, out, &mut det_f);
+        for lane in 1..group.len() {
+            if (0..lane).any(|before| body(before) == body(lane)) {
+                continue;
+            }
+            let (mut other, mut other_det_f) = (vec![[T::zero(); LANES]; out.len()], [1.0; LANES]);
+            of_body[body(lane) as usize](&states, &mut other, &mut other_det_f);
+            mutant!("sweep: a second body in a group takes the law of the first": { of_body[body(0) as usize](&states, &mut other, &mut other_det_f); });
+            for same in (lane..group.len()).filter(|&same| body(same) == body(lane)) {
+                det_f[same] = other_det_f[same];
+                out.iter_mut().zip(&other).for_each(|(out, other)| out[same] = other[same]);
+            }
+        }
+        let check = |(&p, &det_f): (&u32, &f64)| {
+            let error = NonPositiveJacobian::check(det_f).err();
+            error.map(|source| Inadmissible { particle: self.particles.id[p as usize] as usize, source })
+        };
+        let first = group.iter().zip(&det_f).filter_map(check).min_by_key(|error| error.particle);
+        first.map_or(Ok(()), Err)
     }
 }
 
@@ -231,7 +224,7 @@ fn tangents_of<L: Law, const D: usize>(
                 for k in 0..D {
                     for l in 0..D {
                         let block = match &tangent {
-                            point::LocalTangent::Closed(closed) => closed.unit_block(Single, k, l),
+                            point::LocalTangent::Closed(closed) => closed.unit_block(k, l),
                             point::LocalTangent::General(blocks) => blocks[k][l],
                         };
                         for i in 0..D {
@@ -281,40 +274,37 @@ fn write_upper<const D: usize>(a: &[[f64; D]; D], out: &mut ClosedRows, first: u
 
 /// The quantity that is evaluated of a law in every lane.
 #[derive(Clone, Copy)]
-enum What {
-    Stresses,
-    Tangents(Form),
+enum Quantity {
+    Stress,
+    Tangent(Form),
 }
 
-/// The loop of a shipped law. It is not generic, so it is compiled here and not by every crate that uses it.
+/// The evaluation of a shipped law, in vector lanes. It is not generic, so it is compiled here and not by every crate that uses it.
 #[inline(never)]
-fn shipped(law: &Material, dimension: usize, what: What) -> Box<Loop<'static, f64>> {
-    law.with(Choose { dimension, what })
+fn shipped(law: &Material, dimension: usize, quantity: Quantity) -> Box<Evaluation<'static, f64>> {
+    match dimension {
+        1 => law.with(InLanes::<1>(quantity)),
+        2 => law.with(InLanes::<2>(quantity)),
+        _ => law.with(InLanes::<3>(quantity)),
+    }
 }
 
-struct Choose {
-    dimension: usize,
-    what: What,
-}
+/// Makes the evaluation of a law in D dimensions.
+struct InLanes<const D: usize>(Quantity);
 
-impl LawVisitor for Choose {
-    type Output = Box<Loop<'static, f64>>;
+impl<const D: usize> LawVisitor for InLanes<D> {
+    type Output = Box<Evaluation<'static, f64>>;
 
     fn visit<L: Law + 'static>(self, law: L) -> Self::Output {
-        fn in_dimension<L: Law + 'static, const D: usize>(law: L, what: What) -> Box<Loop<'static, f64>> {
-            Box::new(move |states, out, det_f| widest(Evaluate::<L, D> { law: &law, what, states, out, det_f }))
-        }
-        match self.dimension {
-            1 => in_dimension::<L, 1>(law, self.what),
-            2 => in_dimension::<L, 2>(law, self.what),
-            _ => in_dimension::<L, 3>(law, self.what),
-        }
+        Box::new(move |states, out, det_f| {
+            widest(Evaluate::<L, D> { law: &law, quantity: self.0, states, out, det_f });
+        })
     }
 }
 
 struct Evaluate<'a, L, const D: usize> {
     law: &'a L,
-    what: What,
+    quantity: Quantity,
     states: &'a States<'a, f64>,
     out: &'a mut [[f64; LANES]],
     det_f: &'a mut [f64; LANES],
@@ -323,10 +313,10 @@ struct Evaluate<'a, L, const D: usize> {
 impl<L: Law, const D: usize> WithLanes for Evaluate<'_, L, D> {
     #[inline(always)]
     fn run<S: Lanes>(self, _: S) {
-        let Self { law, what, states, out, det_f } = self;
-        match what {
-            What::Stresses => stresses_of::<L, f64, D>(law, states, Part::Whole, out, det_f),
-            What::Tangents(form) => {
+        let Self { law, quantity, states, out, det_f } = self;
+        match quantity {
+            Quantity::Stress => stresses_of::<L, f64, D>(law, states, Part::Whole, out, det_f),
+            Quantity::Tangent(form) => {
                 tangents_of::<L, D>(law, states, Part::Whole, form, out, det_f);
             }
         }

@@ -1,6 +1,6 @@
 //! Stored tangents of the linearisation, the particles of a group side by side: δσ = 𝔸 : L with L = Σ u ⊗ ∇_r N.
 
-use crate::lanes::{In, LANES, Lanes, WithLanes, in_dimension};
+use crate::lanes::{In, LANES, Lane, Lanes, WithLanes, in_dimension};
 use crate::material::ClosedTangent;
 use crate::mechanics::sweep::{Quadratic, pair};
 
@@ -31,7 +31,7 @@ impl Form {
     #[inline(always)]
     fn read<S: Lanes, const D: usize>(self, s: S, rows: &[[f64; LANES]]) -> ClosedTangent<S::N, D> {
         let mut at = 0;
-        let mut a = [[s.zero(); D]; D];
+        let mut a = [[s.splat(0.0); D]; D];
         for i in 0..D {
             for k in 0..D {
                 a[i][k] = s.load(&rows[at]);
@@ -56,7 +56,7 @@ pub(super) const fn general<const D: usize>(k: usize, l: usize, i: usize, j: usi
 /// Reads a symmetric tensor from its upper triangle, stored column by column.
 #[inline(always)]
 fn symmetric<S: Lanes, const D: usize>(s: S, rows: &[[f64; LANES]], at: &mut usize) -> [[S::N; D]; D] {
-    let mut b = [[s.zero(); D]; D];
+    let mut b = [[s.splat(0.0); D]; D];
     for k in 0..D {
         for i in 0..=k {
             b[i][k] = s.load(&rows[*at]);
@@ -83,24 +83,24 @@ impl<const D: usize> WithLanes for In<Product<'_>, D, D> {
     #[inline(always)]
     fn run<S: Lanes>(self, s: S) {
         let Product { form, rows, l, out } = self.0;
-        let mut gradient = [[s.zero(); D]; D];
+        let mut gradient = [[s.splat(0.0); D]; D];
         for i in 0..D {
             for k in 0..D {
                 gradient[i][k] = s.load(&l[i * D + k]);
             }
         }
         let product = match form {
-            Form::Closed => Form::Closed.read::<S, D>(s, rows).product(s, &gradient),
-            Form::ClosedWithBoth => Form::ClosedWithBoth.read::<S, D>(s, rows).product(s, &gradient),
+            Form::Closed => Form::Closed.read::<S, D>(s, rows).product(&gradient),
+            Form::ClosedWithBoth => Form::ClosedWithBoth.read::<S, D>(s, rows).product(&gradient),
             Form::General => {
                 // δσ e_k = Σ_l 𝔸_kl L e_l
-                let mut product = [[s.zero(); D]; D];
+                let mut product = [[s.splat(0.0); D]; D];
                 for k in 0..D {
                     for l in 0..D {
                         let block = entries::<S, D>(s, rows, k, l);
                         for i in 0..D {
                             for j in 0..D {
-                                product[i][k] = s.mul_add(block[i][j], gradient[j][l], product[i][k]);
+                                product[i][k] = product[i][k].add_product(block[i][j], gradient[j][l]);
                             }
                         }
                     }
@@ -110,7 +110,7 @@ impl<const D: usize> WithLanes for In<Product<'_>, D, D> {
         };
         for i in 0..D {
             for k in 0..D {
-                let sum = s.add(s.load(&out[i * D + k]), product[i][k]);
+                let sum = s.load(&out[i * D + k]) + product[i][k];
                 s.store(sum, &mut out[i * D + k]);
             }
         }
@@ -134,15 +134,15 @@ impl<const D: usize> WithLanes for In<AddTo<'_>, D, D> {
         for l in 0..D {
             for k in 0..=l {
                 let (one, other) = match &closed {
-                    Some(closed) => (closed.unit_block(s, k, l), closed.unit_block(s, l, k)),
+                    Some(closed) => (closed.unit_block(k, l), closed.unit_block(l, k)),
                     None => (entries::<S, D>(s, rows, k, l), entries::<S, D>(s, rows, l, k)),
                 };
                 for i in 0..D {
                     for j in 0..D {
-                        let sum = if k < l { s.add(one[i][j], other[i][j]) } else { one[i][j] };
+                        let sum = if k < l { one[i][j] + other[i][j] } else { one[i][j] };
                         mutant!("sweep: blocks without the other half of a pair": sum = one[i][j]);
                         let slot = &mut into.bilinear[pair(k, l)][i][j];
-                        let sum = s.mul_add(factor, sum, s.load(slot));
+                        let sum = s.load(slot).add_product(factor, sum);
                         s.store(sum, slot);
                     }
                 }
@@ -154,7 +154,7 @@ impl<const D: usize> WithLanes for In<AddTo<'_>, D, D> {
 /// 𝔸_kl of a general tangent.
 #[inline(always)]
 fn entries<S: Lanes, const D: usize>(s: S, rows: &[[f64; LANES]], k: usize, l: usize) -> [[S::N; D]; D] {
-    let mut block = [[s.zero(); D]; D];
+    let mut block = [[s.splat(0.0); D]; D];
     for i in 0..D {
         for j in 0..D {
             block[i][j] = s.load(&rows[general::<D>(k, l, i, j)]);

@@ -51,15 +51,12 @@ fn nearest<const D: usize>(
     points: impl Iterator<Item = u32> + Clone,
 ) -> HashMap<u32, Vector<f64, D>> {
     let position = particles.reference().position;
-    let around = |p: usize| {
-        let cell = grid.cell(&position[p]).unwrap_or([0; D]);
-        crate::grid::indices([3; D]).map(move |by| std::array::from_fn(|k| i64::from(cell[k]) + by[k] as i64 - 1))
-    };
-    let mut beside: HashMap<[i64; D], Vec<u32>> = HashMap::new();
+    let cell = |p: usize| grid.cell(&position[p]).unwrap_or([0; D]);
+    let around = |p: usize| grid.around(cell(p), 1).map(|cell| grid.id(cell));
+    let mut beside: HashMap<u64, Vec<u32>> = HashMap::new();
     points.clone().flat_map(|p| around(p as usize)).for_each(|cell| _ = beside.entry(cell).or_default());
     for p in (0..particles.len()).filter(|&p| particles.is_solid(p)) {
-        let cell = grid.cell(&position[p]).unwrap_or([0; D]).map(i64::from);
-        beside.entry(cell).and_modify(|list| list.push(p as u32));
+        beside.entry(grid.id(cell(p))).and_modify(|list| list.push(p as u32));
     }
     let mut found = HashMap::new();
     for point in points {

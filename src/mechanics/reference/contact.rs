@@ -6,7 +6,7 @@ use crate::mechanics::sweep::Supports;
 use crate::nodes::Nodes;
 use crate::particles::Particles;
 use crate::tensor::Vector;
-use std::collections::{BTreeSet, HashMap, HashSet};
+use std::collections::{BTreeSet, HashMap};
 
 /// A node belongs to one body if the variance of the body index at that node, relative to its mean square, is below this tolerance.
 const ALONE: f64 = 1e-9;
@@ -18,32 +18,28 @@ pub(crate) fn reached_conditions<const D: usize>(
     prescribed: &[Prescribed<D>],
     grid: &Grid<D>,
     nodes: &Nodes,
-) -> Vec<usize> {
+) -> BTreeSet<usize> {
     let (present, at_reset) = (&particles.position, particles.reference().position);
     let holders = |index: [u32; D]| {
         let position = grid.position(index);
         prescribed.iter().enumerate().filter(move |(_, one)| one.on.holds(grid, index, &position)).map(|(one, _)| one)
     };
-    // Pairs (cell, condition) where the condition holds a node of the cell that is not active yet.
-    let mut new = HashSet::new();
-    for (cell, ()) in cells(present.iter().map(|x| (x, ())), grid) {
-        for index in corners(grid.index(cell)).filter(|&index| nodes.number(grid.id(index)).is_none()) {
-            new.extend(holders(index).map(|one| (cell, one)));
-        }
-    }
-    mutant!("reference: no wall that is met resets the grid": { return Vec::new(); });
-    if new.is_empty() {
-        return Vec::new();
-    }
-    let was_there = |x: &Vector<f64, D>, one: usize| {
-        grid.cell(x).is_some_and(|cell| corners(cell).any(|index| holders(index).any(|holder| holder == one)))
+    let of_cell = |cell: [u32; D], counts: &dyn Fn(u64) -> bool| -> BTreeSet<usize> {
+        corners(cell).filter(|&index| counts(grid.id(index))).flat_map(&holders).collect()
     };
-    let comes = |one: usize| {
-        present.iter().zip(at_reset).any(|(x, before)| {
-            grid.cell(x).is_some_and(|cell| new.contains(&(grid.id(cell), one)) && !was_there(before, one))
-        })
-    };
-    (0..prescribed.len()).filter(|&one| comes(one)).collect()
+    // The conditions that hold a node of a cell that is not active yet.
+    let inactive = |id: u64| nodes.number(id).is_none();
+    let new = cells(present.iter().map(|x| (x, ())), grid).into_iter();
+    let new: HashMap<u64, _> = new.map(|(cell, ())| (cell, of_cell(grid.index(cell), &inactive))).collect();
+    mutant!("reference: no wall that is met resets the grid": { return BTreeSet::new(); });
+    let mut reached = BTreeSet::new();
+    for (x, before) in present.iter().zip(at_reset) {
+        let met = grid.cell(x).and_then(|cell| new.get(&grid.id(cell))).filter(|met| !met.is_empty());
+        let Some(met) = met else { continue };
+        let were_there = grid.cell(before).map_or_else(BTreeSet::new, |cell| of_cell(cell, &|_| true));
+        reached.extend(met.difference(&were_there));
+    }
+    reached
 }
 
 /// Whether a particle has reached a body to which its own body is not bonded. Its cell has a node of that body. At the last grid reset, its
@@ -83,12 +79,13 @@ fn seen<const D: usize>(position: &[Vector<f64, D>], body: &[u32], grid: &Grid<D
 
 /// The pairs of bodies that lie in cells with a common corner.
 pub(crate) fn pairs<const D: usize>(position: &[Vector<f64, D>], body: &[u32], grid: &Grid<D>) -> BTreeSet<[u32; 2]> {
-    let seen = seen(position, body, grid);
-    let of_node = |bodies: &BTreeSet<u32>| {
-        let bodies = bodies.clone();
-        bodies.clone().into_iter().flat_map(move |one| bodies.clone().into_iter().map(move |other| [one, other]))
-    };
-    seen.values().flat_map(of_node).filter(|[one, other]| one < other).collect()
+    let mut pairs = BTreeSet::new();
+    for bodies in seen(position, body, grid).values() {
+        for &one in bodies {
+            pairs.extend(bodies.range(one + 1..).map(|&other| [one, other]));
+        }
+    }
+    pairs
 }
 
 /// Whether two bodies lie in cells with a common corner now, or shared a node when the shape functions were evaluated.
@@ -97,14 +94,13 @@ pub(crate) fn touch<const D: usize>(particles: &Particles<D>, grid: &Grid<D>, su
         return true;
     }
     // The variance of the body index, weighted with N.
-    let sum = |power: i32| {
-        let mut sum: Vec<Vector<f64, 1>> = vec![Vector::zeros(); supports.active().len()];
-        supports.spread(&mut sum, |p| Vector::from([f64::from(particles.body[p]).powi(power)]));
-        sum
-    };
-    let [weights, means, squares] = [0, 1, 2].map(sum);
-    let mut of_nodes = weights.iter().zip(&means).zip(&squares).map(|((w, m), s)| (w[0], m[0], s[0]));
-    of_nodes.any(|(weight, mean, square)| weight * square - mean * mean > ALONE * weight * square)
+    let mut sums = vec![Vector::<f64, 3>::zeros(); supports.active().len()];
+    supports.spread(&mut sums, |p| {
+        let body = f64::from(particles.body[p]);
+        Vector::from([1.0, body, body * body])
+    });
+    let is_shared = |sum: &Vector<f64, 3>| sum[0] * sum[2] - sum[1] * sum[1] > ALONE * sum[0] * sum[2];
+    sums.iter().any(is_shared)
 }
 
 /// The pairs of a cell's id and an item in that cell, sorted, each pair once.

@@ -8,7 +8,7 @@
 //! ```
 //!
 //! The result then does not depend on the number of steps. With a reset in every step, φ is Δφ, and the formulation is updated Lagrangian.
-//! [`Particles::reference`](crate::particles::Particles::reference) is x_k and F_k, and [`GridState`] is what the nodes keep.
+//! [`Particles::reference`](crate::particles::Particles::reference) is x_k and F_k, and the state of the nodes is a [`Nodal`](crate::mechanics::transfer::Nodal).
 //!
 //! **Contact.** Bodies that share nodes stick, and on a grid that is not reset a body cannot leave a wall. The grid is therefore reset when
 //! a particle reaches a prescribed condition or another body (`contact.rs`). Bodies that touch at the start are *bonded*: in load steps they
@@ -23,9 +23,6 @@ mod equilibrium;
 pub(crate) use contact::{pairs, reached_body, reached_conditions, touch};
 pub use equilibrium::LastEquilibrium;
 
-use crate::mechanics::transfer::Nodal;
-use crate::pooled::Pool;
-use crate::tensor::Vector;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt::{Display, Formatter};
@@ -66,46 +63,6 @@ impl Display for GridReset {
             Self::EveryStep => f.write_str("reset in every step"),
             Self::Never => f.write_str("never reset"),
             Self::Strain(most) => write!(f, "reset when a particle has strained by {most}"),
-        }
-    }
-}
-
-/// The state of the nodes at t_n on a grid that is not reset. All fields have one entry per active node, or are empty.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct GridState<const D: usize> {
-    /// φ
-    pub(crate) motion: Vec<Vector<f64, D>>,
-    /// Δφ/Δt of the last step.
-    pub(crate) rate: Vec<Vector<f64, D>>,
-    /// v; empty without inertia.
-    pub(crate) velocity: Vec<Vector<f64, D>>,
-    /// a; empty without inertia.
-    pub(crate) acceleration: Vec<Vector<f64, D>>,
-    /// R₀; empty with inertia, and on the first grid.
-    pub(crate) out_of_balance: Vec<Vector<f64, D>>,
-}
-
-impl<const D: usize> GridState<D> {
-    /// The state after a step of length `dt` by Δφ, which ends with the nodal state `end`.
-    pub(crate) fn new(end: &Nodal<D>, dphi: &[Vector<f64, D>], dt: f64) -> Self {
-        Self {
-            motion: end.motion.to_vec(),
-            rate: dphi.iter().map(|dphi| dphi / dt).collect(),
-            velocity: end.velocity.to_vec(),
-            acceleration: end.acceleration.to_vec(),
-            out_of_balance: end.out_of_balance.to_vec(),
-        }
-    }
-
-    /// The nodal state at the start of a step, with the mass of `masses`.
-    pub(crate) fn nodal(&self, masses: Nodal<D>, pool: &Pool) -> Nodal<D> {
-        let pooled = |field: &[Vector<f64, D>]| pool.collect(field.iter().copied());
-        Nodal {
-            velocity: pooled(&self.velocity),
-            acceleration: pooled(&self.acceleration),
-            motion: pooled(&self.motion),
-            out_of_balance: pooled(&self.out_of_balance),
-            ..masses
         }
     }
 }

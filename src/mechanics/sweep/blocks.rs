@@ -1,8 +1,7 @@
 //! The nodal diagonal blocks of a quadratic form, B(∇N_I, ∇N_I) + m N_I² I, summed over one group of particles.
 
 use super::kernel::{Pairs, Window, each_tile, tile};
-use crate::lanes::{In, LANES, Lanes, WithLanes, in_dimension};
-use crate::scalar::Arithmetic;
+use crate::lanes::{In, LANES, Lane, Lanes, WithLanes, in_dimension};
 use crate::tensor::{Tensor, Vector};
 
 /// Number of pairs (k, l) of axes with k ≤ l, in 3D.
@@ -57,10 +56,8 @@ impl<const D: usize> WithLanes for In<ScatterBlocks<'_>, D, D> {
     #[inline(always)]
     fn run<S: Lanes>(self, s: S) {
         let ScatterBlocks { window, from, out } = self.0;
-        let rows = window.width[1] * window.width[2];
-        let at_once = S::ROWS;
-        for chunk in 0..rows.div_ceil(at_once) {
-            let pairs = Pairs::<S, D>::new(s, &window, chunk * at_once);
+        for row in (0..window.width[1] * window.width[2]).step_by(S::ROWS) {
+            let pairs = Pairs::<S, D>::new(s, &window, row);
             each_tile!(window, start => blocks_tile::<S, D>(s, &window, start, &pairs, from, out));
         }
     }
@@ -76,8 +73,7 @@ fn blocks_tile<S: Lanes, const D: usize, const W: usize>(
     out: &mut [f64],
     width: usize,
 ) {
-    let (lanes, s) = (s, s.rows());
-    let zero = s.zero();
+    let zero = s.splat_rows(0.0);
     let (n, dn) = window.axis(0);
     let (n, dn) = (&n[start..start + width], &dn[start..start + width]);
     let mut sums = [[[zero; D]; D]; W];
@@ -91,25 +87,24 @@ fn blocks_tile<S: Lanes, const D: usize, const W: usize>(
                 for k in 0..=l {
                     let power = usize::from(k > 0) + usize::from(l > 0);
                     mutant!("sweep: blocks by the wrong power of N_x": power = 2 * usize::from(l > 0));
-                    let product = s.mul(pairs.products[k][p], pairs.products[l][p]);
+                    let product = pairs.products[k][p] * pairs.products[l][p];
                     for j in 0..D {
-                        let coefficient = lanes.splat_rows(from.bilinear[pair(k, l)][i][j][p]);
-                        powers[power][j] = s.mul_add(coefficient, product, powers[power][j]);
+                        let coefficient = s.splat_rows(from.bilinear[pair(k, l)][i][j][p]);
+                        powers[power][j] = powers[power][j].add_product(coefficient, product);
                     }
                 }
             }
-            let square = s.mul(pairs.products[0][p], pairs.products[0][p]);
-            powers[2][i] = s.mul_add(lanes.splat_rows(from.mass[p]), square, powers[2][i]);
+            let square = pairs.products[0][p] * pairs.products[0][p];
+            powers[2][i] = powers[2][i].add_product(s.splat_rows(from.mass[p]), square);
             for x in 0..sums.len() {
                 let (nx, dx) = (n[x][p], dn[x][p]);
-                let (two, one, none) =
-                    (lanes.splat_rows(dx * dx), lanes.splat_rows(nx * dx), lanes.splat_rows(nx * nx));
+                let (two, one, none) = (s.splat_rows(dx * dx), s.splat_rows(nx * dx), s.splat_rows(nx * nx));
                 for j in 0..D {
-                    row[x][j] = s.mul_add(powers[0][j], two, row[x][j]);
+                    row[x][j] = row[x][j].add_product(powers[0][j], two);
                     if D > 1 {
-                        row[x][j] = s.mul_add(powers[1][j], one, row[x][j]);
+                        row[x][j] = row[x][j].add_product(powers[1][j], one);
                     }
-                    row[x][j] = s.mul_add(powers[2][j], none, row[x][j]);
+                    row[x][j] = row[x][j].add_product(powers[2][j], none);
                 }
             }
         }
@@ -117,7 +112,7 @@ fn blocks_tile<S: Lanes, const D: usize, const W: usize>(
             sums[x][i] = row[x];
         }
     }
-    pairs.add(lanes, sums.as_flattened().as_flattened(), start, D * D, out);
+    pairs.add(s, sums.as_flattened().as_flattened(), start, D * D, out);
 }
 
 /// Adds the diagonal blocks of a group's quadratic form to a box of D×D blocks.

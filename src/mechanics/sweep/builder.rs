@@ -1,6 +1,6 @@
 //! The set-up of [`Tiled`](super::tiled::Tiled): the shape functions and groups of each block, and the numbers of the active nodes.
 
-use super::block::{Block, Groups, Span};
+use super::block::{Block, Span};
 use super::columns::{Along, Columns, Family};
 use super::kernel::WIDEST_TILE;
 use super::order::{Key, follows};
@@ -9,7 +9,6 @@ use crate::approximation::ApproximationError;
 use crate::grid::Grid;
 use crate::lanes::LANES;
 use crate::nodes::Nodes;
-use std::ops::Range;
 
 /// Working memory of one thread.
 #[derive(Default)]
@@ -18,41 +17,6 @@ pub(super) struct Scratch {
     along: [Along; 3],
     /// The shape functions of a group along each axis.
     columns: [Columns; 3],
-    /// Groups and their windows.
-    groups: Vec<(Range<usize>, [[u32; 2]; 3])>,
-}
-
-/// The block of the particles `keys`. The number of its first group and its node numbers are filled in later. The arrays of `spare` are
-/// reused.
-///
-/// # Errors
-/// The error of the shape functions of one of the particles.
-pub(super) fn block<const D: usize>(
-    family: Family<'_>,
-    grid: &Grid<D>,
-    points: &Points<'_, D>,
-    keys: &[Key],
-    spare: Block,
-    scratch: &mut Scratch,
-) -> Result<Block, ApproximationError> {
-    let (mut size, mut origin) = ([1; 3], [0; 3]);
-    for (k, along) in scratch.along.iter_mut().enumerate().take(D) {
-        along.x.clear();
-        along.x.extend(keys.iter().map(|key| points.positions[key.particle as usize][k]));
-        along.continue_by(k, keys, points);
-        family.spans(&grid.axis(k), along)?;
-        let [low, high] = union(&along.spans);
-        size[k] = (high - low) as usize;
-        origin[k] = low;
-    }
-    let Block { groups, mut nodes, mut places, mut active, .. } = spare;
-    active.clear();
-    active.resize(size[1] * size[2], 0);
-    let building = Building { family, grid, keys, origin, size };
-    let groups = building.groups(groups, scratch, &mut active)?;
-    nodes.clear();
-    places.clear();
-    Ok(Block { groups, origin, size, nodes, places, active })
 }
 
 /// The smallest interval that holds all `spans`.
@@ -61,97 +25,116 @@ fn union(spans: &[[u32; 2]]) -> [u32; 2] {
     spans.iter().fold([u32::MAX, 0], |[low, high], span| [low.min(span[0]), high.max(span[1])])
 }
 
-/// A block under construction.
-struct Building<'a, const D: usize> {
-    family: Family<'a>,
-    grid: &'a Grid<D>,
-    keys: &'a [Key],
-    origin: [u32; 3],
-    size: [usize; 3],
+/// The data from which blocks are built.
+pub(super) struct Builder<'a, const D: usize> {
+    pub(super) family: Family<'a>,
+    pub(super) grid: &'a Grid<D>,
+    pub(super) points: &'a Points<'a, D>,
 }
 
-impl<const D: usize> Building<'_, D> {
-    /// The groups of the particles, in the arrays of `spare`. Marks the nodes with nonzero shape functions in `active`.
-    fn groups(&self, spare: Groups, scratch: &mut Scratch, active: &mut [u64]) -> Result<Groups, ApproximationError> {
-        let mut built = spare.emptied(D, self.size);
-        let mut groups = std::mem::take(&mut scratch.groups);
-        groups.clear();
-        let (mut start, mut rows) = (0, 0);
-        while start < self.keys.len() {
-            let end = group_end::<D>(self.keys, &scratch.along[0].spans, start);
-            let mut windows = [[0; 2]; 3];
-            for (window, along) in windows.iter_mut().zip(&scratch.along).take(D) {
-                *window = union(&along.spans[start..end]);
-                rows += 2 * (window[1] - window[0]) as usize;
+impl<const D: usize> Builder<'_, D> {
+    /// Makes `block` the block of the particles `keys`, in the arrays that it has. The number of its first group and its node numbers are
+    /// filled in later.
+    ///
+    /// # Errors
+    /// The error of the shape functions of one of the particles.
+    pub(super) fn build(
+        &self,
+        keys: &[Key],
+        block: &mut Block,
+        scratch: &mut Scratch,
+    ) -> Result<(), ApproximationError> {
+        (block.origin, block.size) = ([0; 3], [1; 3]);
+        for (k, along) in scratch.along.iter_mut().enumerate().take(D) {
+            along.x.clear();
+            along.x.extend(keys.iter().map(|key| self.points.positions[key.particle as usize][k]));
+            along.continue_by(k, keys, self.points);
+            self.family.spans(&self.grid.axis(k), along)?;
+            let [low, high] = union(&along.spans);
+            block.size[k] = (high - low) as usize;
+            block.origin[k] = low;
+        }
+        self.group(keys, block, &scratch.along);
+        block.nodes.clear();
+        block.places.clear();
+        block.active.clear();
+        block.active.resize(block.size[1] * block.size[2], 0);
+        let mut start = 0;
+        for group in 0..block.len() {
+            let end = start + usize::from(block.windows[group].lanes);
+            for k in 0..D {
+                self.family.columns(&self.grid.axis(k), &mut scratch.along[k], start..end, &mut scratch.columns[k])?;
             }
-            groups.push((start..end, windows));
+            write(block, group, &scratch.columns[..D]);
+            mark::<D>(block, group, &scratch.columns);
             start = end;
         }
-        built.windows.reserve_exact(groups.len());
-        built.particles.reserve_exact(groups.len());
-        built.weights.reserve_exact(rows);
-        // `spare` may have been a much denser block.
-        built.windows.shrink_to(2 * groups.len());
-        built.particles.shrink_to(2 * groups.len());
-        built.weights.shrink_to(2 * rows);
-        for (particles, windows) in &groups {
-            self.push(&mut built, particles.clone(), windows, scratch, active)?;
-        }
-        scratch.groups = groups;
-        Ok(built)
-    }
-
-    /// Appends a group.
-    fn push(
-        &self,
-        groups: &mut Groups,
-        particles: Range<usize>,
-        windows: &[[u32; 2]; 3],
-        scratch: &mut Scratch,
-        active: &mut [u64],
-    ) -> Result<(), ApproximationError> {
-        let (keys, Scratch { along, columns, .. }) = (&self.keys[particles.clone()], scratch);
-        for k in 0..D {
-            self.family.columns(&self.grid.axis(k), &mut along[k], particles.clone(), &mut columns[k])?;
-        }
-        let mut width = [1; 3];
-        let mut first = 0;
-        for k in (0..D).rev() {
-            width[k] = (windows[k][1] - windows[k][0]) as u8;
-            first = first * self.size[k] + (windows[k][0] - self.origin[k]) as usize;
-        }
-        let group = Span { weights: groups.weights.len() as u32, first: first as u32, width, lanes: keys.len() as u8 };
-        for k in 0..D {
-            let (start, nodes) = (groups.weights.len(), usize::from(width[k]));
-            groups.weights.resize(start + 2 * nodes, [0.0; LANES]);
-            let (values, derivatives) = groups.weights[start..].split_at_mut(nodes);
-            columns[k].write(keys.len(), windows[k][0], values, derivatives);
-        }
-        groups.particles.push(std::array::from_fn(|lane| keys.get(lane).map_or(u32::MAX, |key| key.particle)));
-        groups.windows.push(group);
-        self.mark(groups, &columns[..D], keys.len(), active);
         Ok(())
     }
 
-    /// Marks the nodes with N ≠ 0 or ∇N ≠ 0 of the first `count` lanes of the last group.
-    fn mark(&self, groups: &Groups, columns: &[Columns], count: usize, active: &mut [u64]) {
-        let nx = self.size[0];
-        for lane in 0..count {
-            let (mut begin, mut end) = ([0; 3], [1; 3]);
-            for k in 0..D {
-                [begin[k], end[k]] = columns[k].spans[lane].map(|node| (node - self.origin[k]) as usize);
+    /// Groups the particles, and makes room for their weights, which are zero.
+    fn group(&self, keys: &[Key], block: &mut Block, along: &[Along; 3]) {
+        block.windows.clear();
+        block.particles.clear();
+        let (mut start, mut rows) = (0, 0);
+        while start < keys.len() {
+            let end = group_end::<D>(keys, &along[0].spans, start);
+            let (mut width, mut first, weights) = ([1; 3], 0, rows as u32);
+            for k in (0..D).rev() {
+                let [low, high] = union(&along[k].spans[start..end]);
+                width[k] = (high - low) as u8;
+                first = first * block.size[k] + (low - block.origin[k]) as usize;
+                rows += 2 * usize::from(width[k]);
             }
-            // No N vanishes or underflows, so all nodes of the particle's own window are active.
-            let whole = columns.iter().map(|columns| columns.smallest[lane]).product::<f64>() > 0.0;
-            if !whole {
-                groups.entries::<D>(groups.len() - 1, lane, |place, _, _| active[place / nx] |= 1 << (place % nx));
-                continue;
-            }
-            let row = ((1 << (end[0] - begin[0])) - 1) << begin[0];
-            for z in begin[2]..end[2] {
-                for y in begin[1]..end[1] {
-                    active[z * self.size[1] + y] |= row;
-                }
+            let keys = &keys[start..end];
+            block.windows.push(Span { weights, first: first as u32, width, lanes: keys.len() as u8 });
+            block.particles.push(std::array::from_fn(|lane| keys.get(lane).map_or(u32::MAX, |key| key.particle)));
+            start = end;
+        }
+        block.weights.clear();
+        block.weights.reserve_exact(rows);
+        block.weights.resize(rows, [0.0; LANES]);
+        // The arrays may come from a much denser block.
+        block.windows.shrink_to(2 * block.windows.len());
+        block.particles.shrink_to(2 * block.particles.len());
+        block.weights.shrink_to(2 * rows);
+    }
+}
+
+/// Writes the weights of a group.
+fn write(block: &mut Block, group: usize, columns: &[Columns]) {
+    let Span { weights, first, width, lanes } = block.windows[group];
+    let (mut start, mut place) = (weights as usize, first as usize);
+    for (k, columns) in columns.iter().enumerate() {
+        let low = block.origin[k] + (place % block.size[k]) as u32;
+        place /= block.size[k];
+        let nodes = usize::from(width[k]);
+        let (values, derivatives) = block.weights[start..start + 2 * nodes].split_at_mut(nodes);
+        columns.write(usize::from(lanes), low, values, derivatives);
+        start += 2 * nodes;
+    }
+}
+
+/// Marks the nodes with N ≠ 0 or ∇N ≠ 0 at a particle of a group as active.
+fn mark<const D: usize>(block: &mut Block, group: usize, columns: &[Columns; 3]) {
+    let [nx, ny, _] = block.size;
+    for lane in 0..usize::from(block.windows[group].lanes) {
+        // No N vanishes or underflows, so all nodes of the particle's own window are active.
+        let whole = columns[..D].iter().map(|columns| columns.smallest[lane]).product::<f64>() > 0.0;
+        if !whole {
+            let mut active = std::mem::take(&mut block.active);
+            block.entries::<D>(group, lane).for_each(|(place, ..)| active[place / nx] |= 1 << (place % nx));
+            block.active = active;
+            continue;
+        }
+        let (mut begin, mut end) = ([0; 3], [1; 3]);
+        for k in 0..D {
+            [begin[k], end[k]] = columns[k].spans[lane].map(|node| (node - block.origin[k]) as usize);
+        }
+        let row = ((1 << (end[0] - begin[0])) - 1) << begin[0];
+        for z in begin[2]..end[2] {
+            for y in begin[1]..end[1] {
+                block.active[z * ny + y] |= row;
             }
         }
     }
@@ -182,7 +165,7 @@ fn group_end<const D: usize>(keys: &[Key], along_x: &[[u32; 2]], start: usize) -
 }
 
 /// A row of a box along x.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(super) struct Row {
     /// Grid number of the node with index 0 along x in its line.
     start: u64,

@@ -6,8 +6,8 @@
 //! - Scatter, one row (y, z) of the window a lane: f_I += σ ∇N_I + q N_I, summed over the particles in registers.
 
 use super::Mode;
-use crate::lanes::{In, LANES, Lanes, WithLanes, in_dimension};
-use crate::scalar::{Arithmetic, Real};
+use crate::lanes::{In, LANES, Lane, Lanes, WithLanes, in_dimension};
+use crate::scalar::Real;
 use crate::tensor::Vector;
 use nalgebra::SMatrix;
 
@@ -106,7 +106,7 @@ impl<const C: usize, const D: usize> WithLanes for In<Gather<'_>, C, D> {
     #[inline(always)]
     fn run<S: Lanes>(self, s: S) {
         let Gather { window, nodal, mode, value, gradient } = self.0;
-        let mut out = Gathered { value: [s.zero(); C], gradient: [[s.zero(); D]; C] };
+        let mut out = Gathered { value: [s.splat(0.0); C], gradient: [[s.splat(0.0); D]; C] };
         each_tile!(window, start => gather_tile::<S, C, D>(s, &window, start, nodal, mode.value, &mut out));
         // Loops, not closures: a closure that is not inlined loses the wide instructions.
         if mode.value {
@@ -143,13 +143,13 @@ fn row<S: Lanes, const C: usize, const W: usize>(
     width: usize,
 ) -> Sums<S::N, C, 2> {
     let row = &nodal[first * C..(first + width) * C];
-    let mut sums = [[s.zero(); C]; 2];
+    let mut sums = [[s.splat(0.0); C]; 2];
     for x in 0..width.min(W) {
         for c in 0..C {
             let u = s.splat(row[x * C + c]);
             mutant!("sweep: component 0 gathered for all": u = s.splat(row[x * C]));
-            sums[0][c] = s.mul_add(u, weights[0][x], sums[0][c]);
-            sums[1][c] = s.mul_add(u, weights[1][x], sums[1][c]);
+            sums[0][c] = sums[0][c].add_product(u, weights[0][x]);
+            sums[1][c] = sums[1][c].add_product(u, weights[1][x]);
         }
     }
     sums
@@ -166,14 +166,14 @@ fn plane<S: Lanes, const C: usize, const W: usize>(
     width: usize,
 ) -> Sums<S::N, C, 3> {
     let (ny, dy) = window.axis(1);
-    let mut sums = [[s.zero(); C]; 3];
+    let mut sums = [[s.splat(0.0); C]; 3];
     for y in 0..ny.len() {
         let [value, slope] = row::<S, C, W>(s, weights, nodal, first + y * window.stride[0], width);
         let (ny, dy) = (s.load(&ny[y]), s.load(&dy[y]));
         for c in 0..C {
-            sums[0][c] = s.mul_add(value[c], ny, sums[0][c]);
-            sums[1][c] = s.mul_add(slope[c], ny, sums[1][c]);
-            sums[2][c] = s.mul_add(value[c], dy, sums[2][c]);
+            sums[0][c] = sums[0][c].add_product(value[c], ny);
+            sums[1][c] = sums[1][c].add_product(slope[c], ny);
+            sums[2][c] = sums[2][c].add_product(value[c], dy);
         }
     }
     sums
@@ -191,7 +191,7 @@ fn gather_tile<S: Lanes, const C: usize, const D: usize, const W: usize>(
 ) {
     let (n, dn) = window.axis(0);
     let (n, dn) = (&n[start..start + width], &dn[start..start + width]);
-    let mut weights = [[s.zero(); W]; 2];
+    let mut weights = [[s.splat(0.0); W]; 2];
     for x in 0..width.min(W) {
         (weights[0][x], weights[1][x]) = (s.load(&n[x]), s.load(&dn[x]));
     }
@@ -199,15 +199,15 @@ fn gather_tile<S: Lanes, const C: usize, const D: usize, const W: usize>(
     if D == 1 {
         let [value, slope] = row::<S, C, W>(s, &weights, nodal, origin, width);
         for c in 0..C {
-            out.value[c] = s.add(out.value[c], value[c]);
-            out.gradient[c][0] = s.add(out.gradient[c][0], slope[c]);
+            out.value[c] = out.value[c] + value[c];
+            out.gradient[c][0] = out.gradient[c][0] + slope[c];
         }
     } else if D == 2 {
         let [value, x, y] = plane::<S, C, W>(s, window, &weights, nodal, origin, width);
         for c in 0..C {
-            out.value[c] = s.add(out.value[c], value[c]);
-            out.gradient[c][0] = s.add(out.gradient[c][0], x[c]);
-            out.gradient[c][1] = s.add(out.gradient[c][1], y[c]);
+            out.value[c] = out.value[c] + value[c];
+            out.gradient[c][0] = out.gradient[c][0] + x[c];
+            out.gradient[c][1] = out.gradient[c][1] + y[c];
         }
     } else {
         let (nz, dz) = window.axis(2);
@@ -216,13 +216,13 @@ fn gather_tile<S: Lanes, const C: usize, const D: usize, const W: usize>(
             let (nz, dz) = (s.load(&nz[z]), s.load(&dz[z]));
             if with_value {
                 for c in 0..C {
-                    out.value[c] = s.mul_add(value[c], nz, out.value[c]);
+                    out.value[c] = out.value[c].add_product(value[c], nz);
                 }
             }
             for c in 0..C {
-                out.gradient[c][0] = s.mul_add(x[c], nz, out.gradient[c][0]);
-                out.gradient[c][1] = s.mul_add(y[c], nz, out.gradient[c][1]);
-                out.gradient[c][2] = s.mul_add(value[c], dz, out.gradient[c][2]);
+                out.gradient[c][0] = out.gradient[c][0].add_product(x[c], nz);
+                out.gradient[c][1] = out.gradient[c][1].add_product(y[c], nz);
+                out.gradient[c][2] = out.gradient[c][2].add_product(value[c], dz);
             }
         }
     }
@@ -244,10 +244,8 @@ impl<const C: usize, const D: usize> WithLanes for In<Scatter<'_>, C, D> {
         let Scatter { window, mode, value, gradient, out } = self.0;
         // Fixed lengths, so that no index is checked.
         let (Some(value), Some(gradient)) = (value.first_chunk(), gradient.as_chunks().0.first_chunk()) else { return };
-        let rows = window.width[1] * window.width[2];
-        let at_once = S::ROWS;
-        for chunk in 0..rows.div_ceil(at_once) {
-            let pairs = Pairs::<S, D>::new(s, &window, chunk * at_once);
+        for row in (0..window.width[1] * window.width[2]).step_by(S::ROWS) {
+            let pairs = Pairs::<S, D>::new(s, &window, row);
             each_tile!(window, start => scatter_tile::<S, C, D>(s, &window, start, &pairs, mode, value, gradient, out));
         }
     }
@@ -256,7 +254,7 @@ impl<const C: usize, const D: usize> WithLanes for In<Scatter<'_>, C, D> {
 /// The products N_y N_z, N_y' N_z, N_y N_z' of each particle, a lane a row (y, z) of the window. The rows are as many as fill a register.
 /// `places` is where the rows begin in the box.
 pub(super) struct Pairs<S: Lanes, const D: usize> {
-    pub(super) products: [[<S::Rows as Arithmetic>::N; LANES]; D],
+    pub(super) products: [[S::Rows; LANES]; D],
     places: [usize; LANES],
     count: usize,
 }
@@ -266,34 +264,30 @@ impl<S: Lanes, const D: usize> Pairs<S, D> {
     pub(super) fn new(s: S, window: &Window<'_>, start: usize) -> Self {
         let [_, wy, wz] = window.width;
         let count = (wy * wz - start).min(S::ROWS);
-        let mut products = [[s.zero(); LANES]; D];
+        let mut products = [[s.splat(0.0); LANES]; D];
         let mut places = [0; LANES];
         let (mut y, mut z) = (start % wy, start / wy);
         for lane in 0..count {
             places[lane] = window.first + y * window.stride[0] + z * window.stride[1];
             mutant!("sweep: a plane of the scatter one node early": { places[lane] -= z; });
-            if D == 1 {
-                products[0][lane] = s.splat(1.0);
-            } else {
-                let (n, dn) = window.axis(1);
-                let (ny, dy) = (s.load(&n[y]), s.load(&dn[y]));
-                if D == 2 {
-                    (products[0][lane], products[D - 1][lane]) = (ny, dy);
-                } else {
-                    let (n, dn) = window.axis(2);
-                    let (nz, dz) = (s.load(&n[z]), s.load(&dn[z]));
-                    products[0][lane] = s.mul(ny, nz);
-                    products[1 % D][lane] = s.mul(dy, nz);
-                    products[2 % D][lane] = s.mul(ny, dz);
+            let at = [0, y, z];
+            let mut product = [s.splat(1.0); D];
+            for axis in 1..D {
+                let (n, dn) = window.axis(axis);
+                let (n, dn) = (s.load(&n[at[axis]]), s.load(&dn[at[axis]]));
+                for k in 0..D {
+                    product[k] = product[k] * if k == axis { dn } else { n };
                 }
+            }
+            for k in 0..D {
+                products[k][lane] = product[k];
             }
             y += 1;
             if y == wy {
                 (y, z) = (0, z + 1);
             }
         }
-        let r = s.rows();
-        let mut columns = [[r.zero(); LANES]; D];
+        let mut columns = [[s.splat_rows(0.0); LANES]; D];
         for k in 0..D {
             columns[k] = s.columns(&products[k]);
         }
@@ -303,7 +297,7 @@ impl<S: Lanes, const D: usize> Pairs<S, D> {
     /// Adds `sums` to the rows of the box, from the node `at` of each row on. `sums` are the entries of a row in order, `numbers` for each
     /// node, and hold a row in each lane.
     #[inline(always)]
-    pub(super) fn add(&self, s: S, sums: &[<S::Rows as Arithmetic>::N], at: usize, numbers: usize, out: &mut [f64]) {
+    pub(super) fn add(&self, s: S, sums: &[S::Rows], at: usize, numbers: usize, out: &mut [f64]) {
         let mut places = self.places;
         for place in &mut places {
             *place = (*place + at) * numbers;
@@ -325,8 +319,7 @@ fn scatter_tile<S: Lanes, const C: usize, const D: usize, const W: usize>(
     out: &mut [f64],
     width: usize,
 ) {
-    let (lanes, s) = (s, s.rows());
-    let zero = s.zero();
+    let zero = s.splat_rows(0.0);
     let (n, dn) = window.axis(0);
     let (n, dn) = (&n[start..start + width], &dn[start..start + width]);
     let mut sums = [[zero; C]; W];
@@ -338,35 +331,35 @@ fn scatter_tile<S: Lanes, const C: usize, const D: usize, const W: usize>(
         if mode.gradient {
             for c in 0..C {
                 for k in 1..D {
-                    across[c] = s.mul_add(lanes.splat_rows(gradient[c][k][p]), pairs.products[k][p], across[c]);
+                    across[c] = across[c].add_product(s.splat_rows(gradient[c][k][p]), pairs.products[k][p]);
                 }
-                along[c] = s.mul(lanes.splat_rows(gradient[c][0][p]), pairs.products[0][p]);
+                along[c] = s.splat_rows(gradient[c][0][p]) * pairs.products[0][p];
             }
         }
         if mode.value {
             for c in 0..C {
-                across[c] = s.mul_add(lanes.splat_rows(value[c][p]), pairs.products[0][p], across[c]);
+                across[c] = across[c].add_product(s.splat_rows(value[c][p]), pairs.products[0][p]);
             }
         }
         if !mode.gradient {
             for x in 0..sums.len() {
-                let nx = lanes.splat_rows(n[x][p]);
+                let nx = s.splat_rows(n[x][p]);
                 for c in 0..C {
-                    sums[x][c] = s.mul_add(across[c], nx, sums[x][c]);
+                    sums[x][c] = sums[x][c].add_product(across[c], nx);
                 }
             }
             continue;
         }
         for x in 0..sums.len() {
-            let (nx, dx) = (lanes.splat_rows(n[x][p]), lanes.splat_rows(dn[x][p]));
+            let (nx, dx) = (s.splat_rows(n[x][p]), s.splat_rows(dn[x][p]));
             mutant!("sweep: stresses along x scattered by N for its slope": dx = nx);
             for c in 0..C {
-                sums[x][c] = s.mul_add(across[c], nx, sums[x][c]);
-                sums[x][c] = s.mul_add(along[c], dx, sums[x][c]);
+                sums[x][c] = sums[x][c].add_product(across[c], nx);
+                sums[x][c] = sums[x][c].add_product(along[c], dx);
             }
         }
     }
-    pairs.add(lanes, sums.as_flattened(), start, C, out);
+    pairs.add(s, sums.as_flattened(), start, C, out);
 }
 
 /// Gathers values and gradients from a box with `components` numbers a node: 1, or as many as there are axes.

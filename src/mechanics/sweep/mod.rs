@@ -55,8 +55,8 @@ use crate::lanes::LANES;
 /// `(group, u and L, q and σ)` of every field: adds to q and σ, which begin with zero. A pass makes this function once.
 type Point<'a, const C: usize, const D: usize> = dyn Fn(Group<'_>, &[At<f64, C, D>], &mut [At<f64, C, D>]) + Sync + 'a;
 
-/// `(particle, u and L of every field, lane)`: the result at the particle in this lane.
-type Visit<'a, R, const C: usize, const D: usize> = dyn Fn(usize, &[At<f64, C, D>], usize) -> R + Sync + 'a;
+/// `(group, u and L of every field)`: the result of the group.
+type Evaluate<'a, R, const C: usize, const D: usize> = dyn Fn(Group<'_>, &[At<f64, C, D>]) -> R + Sync + 'a;
 
 /// `(group, u and L, rows)`: fills the rows of a group.
-pub(crate) type Fill<'a, const D: usize> = dyn Fn(Group<'_>, &At<f64, D, D>, &mut [[f64; LANES]]) + Sync + 'a;
+type Fill<'a, const D: usize> = dyn Fn(Group<'_>, &At<f64, D, D>, &mut [[f64; LANES]]) + Sync + 'a;

@@ -1,10 +1,10 @@
 //! The number types of nodal fields. Gather and scatter are linear, so a dual number is two fields of plain numbers.
 
 use super::kernel::At;
-use crate::lanes::LANES;
 use crate::scalar::Real;
 use crate::tensor::Vector;
-use num_dual::{Dual2_64, Dual64};
+use num_dual::Dual64;
+use std::array::from_fn;
 use std::borrow::Cow;
 
 /// A number made of one or more plain numbers. Each of them is a field of its own in the kernels.
@@ -34,25 +34,17 @@ pub trait Number: Real + Send + Sync + 'static {
         sums: &mut [At<f64, C, D>],
         point: impl FnOnce(&At<Self, C, D>, &mut At<Self, C, D>) -> R,
     ) -> R {
-        let (mut at, mut sum) = (At::zero(), At::<Self, C, D>::zero());
-        for c in 0..C {
-            for lane in 0..LANES {
-                at.value[c][lane] = Self::from_fields(|i| fields[i].value[c][lane]);
-                for k in 0..D {
-                    at.gradient[c][k][lane] = Self::from_fields(|i| fields[i].gradient[c][k][lane]);
-                }
-            }
-        }
+        let number = |x: &dyn Fn(&At<f64, C, D>) -> f64| Self::from_fields(|i| x(&fields[i]));
+        let at = At {
+            value: from_fn(|c| from_fn(|lane| number(&|at| at.value[c][lane]))),
+            gradient: from_fn(|c| from_fn(|k| from_fn(|lane| number(&|at| at.gradient[c][k][lane])))),
+        };
+        let mut sum = At::<Self, C, D>::zero();
         let result = point(&at, &mut sum);
         for (i, sums) in sums.iter_mut().enumerate() {
-            for c in 0..C {
-                for lane in 0..LANES {
-                    sums.value[c][lane] = sum.value[c][lane].field(i);
-                    for k in 0..D {
-                        sums.gradient[c][k][lane] = sum.gradient[c][k][lane].field(i);
-                    }
-                }
-            }
+            let field = |x: Self| x.field(i);
+            sums.value = sum.value.map(|row| row.map(field));
+            sums.gradient = sum.gradient.map(|rows| rows.map(|row| row.map(field)));
         }
         result
     }
@@ -97,24 +89,16 @@ impl Number for f64 {
     }
 }
 
-macro_rules! dual {
-    ($number:ident, $fields:expr, $($field:ident),*) => {
-        impl Number for $number {
-            const FIELDS: usize = $fields;
+impl Number for Dual64 {
+    const FIELDS: usize = 2;
 
-            #[inline(always)]
-            fn field(&self, i: usize) -> f64 {
-                [$(self.$field),*][i]
-            }
+    #[inline(always)]
+    fn field(&self, i: usize) -> f64 {
+        [self.re, self.eps][i]
+    }
 
-            #[inline(always)]
-            fn from_fields(field: impl FnMut(usize) -> f64) -> Self {
-                let [$($field),*] = std::array::from_fn(field);
-                Self::new($($field),*)
-            }
-        }
-    };
+    #[inline(always)]
+    fn from_fields(mut field: impl FnMut(usize) -> f64) -> Self {
+        Self::new(field(0), field(1))
+    }
 }
-
-dual!(Dual64, 2, re, eps);
-dual!(Dual2_64, 3, re, v1, v2);

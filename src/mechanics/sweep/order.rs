@@ -134,7 +134,7 @@ mod tests {
 
     #[test]
     fn sorting_needs_no_order_and_uses_any() {
-        let number = |i: u64| (i * 0x9e37_79b9_7f4a_7c15) >> 40;
+        let number = |i: u64| i.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40;
         let orders: [&dyn Fn(u64) -> u64; 7] = [
             &|i| i,
             &|i| 1000 - i,

@@ -2,10 +2,9 @@
 
 use super::kernel::At;
 use super::supports::{Way, either};
-use super::{Fill, Group, Mode, Number, Quadratic, Supports, Weights};
+use super::{Group, Mode, Number, Quadratic, Supports, Weights};
 use crate::lanes::LANES;
 use crate::parallel::First;
-use crate::scalar::Real;
 use crate::tensor::{Tensor, Vector};
 use std::convert::Infallible;
 
@@ -37,19 +36,19 @@ impl<const D: usize> Supports<D> {
         failure.check()
     }
 
-    /// [`Self::sweep`] of a linearised term, which always exists: a product with its tangent.
-    pub(crate) fn product(
+    /// [`Self::sweep`] of a function that always has a value, such as a product with a tangent.
+    pub(crate) fn accumulate<T: Number, const C: usize>(
         &self,
-        u: &[Vector<f64, D>],
+        field: Option<&[Vector<T, C>]>,
         mode: Mode,
-        out: &mut [Vector<f64, D>],
-        point: impl Fn(Group<'_>, &At<f64, D, D>, &mut At<f64, D, D>) + Sync,
+        out: &mut [Vector<T, C>],
+        point: impl Fn(Group<'_>, &At<T, C, D>, &mut At<T, C, D>) + Sync,
     ) {
         let point = |group: Group<'_>, at: &_, sums: &mut _| -> Result<(), (usize, Infallible)> {
             point(group, at, sums);
             Ok(())
         };
-        let Ok(()) = self.sweep(Some(u), mode, out, point);
+        let Ok(()) = self.sweep(field, mode, out, point);
     }
 
     /// Calls `fill(group, L, rows)` for every group. Each group has `count` rows of its own.
@@ -58,10 +57,10 @@ impl<const D: usize> Supports<D> {
         field: &[Vector<f64, D>],
         count: usize,
         rows: &mut [[f64; LANES]],
-        fill: &Fill<'_, D>,
+        fill: impl Fn(Group<'_>, &At<f64, D, D>, &mut [[f64; LANES]]) + Sync,
     ) {
         self.pass();
-        either!(self, way => way.fill_rows(bytemuck::cast_slice(field), count, rows, fill));
+        either!(self, way => way.fill_rows(bytemuck::cast_slice(field), count, rows, &fill));
     }
 
     /// `out_I +=` Σ_p B_p(∇_r N_I, ∇_r N_I) + m_p N_I² I, the nodal diagonal blocks of quadratic forms. `quadratic` fills in the form of
@@ -72,10 +71,10 @@ impl<const D: usize> Supports<D> {
     }
 
     /// `out_I += Σ_p σ_p ∇_r N_I + q_p N_I` with `(q_p, σ_p) = point(p, u_p, ∇u_p)`, u_p = Σ u_I N_I and
-    /// ∇u_p = Σ u_I ⊗ ∇_r N_I.
+    /// ∇u_p = Σ u_I ⊗ ∇_r N_I. The scatter has the given weights in place of N and ∇_r N.
     ///
     /// ```
-    /// use bfree::mechanics::{check::direction, sweep::Supports};
+    /// use bfree::mechanics::{check::direction, sweep::{Supports, Weights}};
     /// use bfree::tensor::{Tensor, Vector, contract};
     /// use std::convert::Infallible;
     ///
@@ -87,7 +86,7 @@ impl<const D: usize> Supports<D> {
     /// let (u, w) = (direction::<2>(nodes.len(), 1), direction::<2>(nodes.len(), 2));
     /// let state = |u: Vector<f64, 2>, gradient: Tensor<f64, 2>| (u * 3.0, gradient * 2.0);
     /// let mut force = vec![Vector::zeros(); nodes.len()];
-    /// supports.assemble(&u, &mut force, |_, u, gradient| Ok::<_, Infallible>(state(u, gradient)))?;
+    /// supports.assemble(&u, Weights::Signed, &mut force, |_, u, gradient| Ok::<_, Infallible>(state(u, gradient)))?;
     /// let at_nodes: f64 = force.iter().zip(&w).map(|(f, w)| f.dot(w)).sum();
     /// let states = supports.interpolate(&u, |_, u, gradient| Ok::<_, Infallible>(state(u, gradient)))?;
     /// let work = supports.interpolate(&w, |p, w, gradient| {
@@ -95,6 +94,15 @@ impl<const D: usize> Supports<D> {
     ///     Ok::<_, Infallible>(contract(&sigma, &gradient) + q.dot(&w))
     /// })?;
     /// assert!((at_nodes - work.iter().sum::<f64>()).abs() < 1e-10);
+    ///
+    /// // A uniform pressure acts on the rim of a body. Inside, the forces of the particles around a node cancel, but their sizes do not.
+    /// let pressure = |_: usize, _: Vector<f64, 2>, _: Tensor<f64, 2>| Ok::<_, Infallible>((Vector::zeros(), Tensor::identity()));
+    /// let (mut force, mut size) = (vec![Vector::zeros(); nodes.len()], vec![Vector::zeros(); nodes.len()]);
+    /// supports.assemble(&u, Weights::Signed, &mut force, pressure)?;
+    /// supports.assemble(&u, Weights::Magnitude, &mut size, pressure)?;
+    /// assert!(force.iter().zip(&size).all(|(f, size)| f.norm() <= size.norm() * (1.0 + 1e-15)));
+    /// let inside = nodes.number(grid.id([5, 5])).ok_or("in the middle of the disc")?;
+    /// assert!(force[inside].norm() < 1e-3 * size[inside].norm());
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     ///
@@ -103,43 +111,26 @@ impl<const D: usize> Supports<D> {
     pub fn assemble<T: Number, E: Send>(
         &self,
         field: &[Vector<T, D>],
+        weights: Weights,
         out: &mut [Vector<T, D>],
         point: impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> Result<(Vector<T, D>, Tensor<T, D>), E> + Sync,
     ) -> Result<(), E> {
-        self.sweep(Some(field), Mode::BOTH, out, each_lane(point))
-    }
-
-    /// The sum of [`Self::assemble`] with |N_I| and |∇_r N_I| in place of N_I and ∇_r N_I.
-    ///
-    /// ```
-    /// use bfree::mechanics::{check::direction, sweep::Supports};
-    /// use bfree::tensor::{Tensor, Vector};
-    /// use std::convert::Infallible;
-    ///
-    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
-    /// let simulation = scene.build::<2>("scenes".as_ref())?;
-    /// let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &simulation.particles.position)?;
-    /// // A uniform pressure acts on the rim of a body. Inside, the forces of the particles around a node cancel, but their sizes do not.
-    /// let pressure = |_: usize, _: Vector<f64, 2>, _: Tensor<f64, 2>| Ok::<_, Infallible>((Vector::zeros(), Tensor::identity()));
-    /// let (field, mut force) = (direction(nodes.len(), 1), vec![Vector::zeros(); nodes.len()]);
-    /// let mut magnitude = force.clone();
-    /// supports.assemble(&field, &mut force, pressure)?;
-    /// supports.assemble_magnitudes(&field, &mut magnitude, pressure)?;
-    /// assert!(force.iter().zip(&magnitude).all(|(f, size)| f.abs().norm() <= size.norm() * (1.0 + 1e-15)));
-    /// let inside = nodes.number(simulation.grid.id([5, 5])).ok_or("in the middle of the disc")?;
-    /// assert!(force[inside].norm() < 1e-3 * magnitude[inside].norm());
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    ///
-    /// # Errors
-    /// The error of the first particle in memory whose `point` fails.
-    pub fn assemble_magnitudes<T: Number, E: Send>(
-        &self,
-        field: &[Vector<T, D>],
-        out: &mut [Vector<T, D>],
-        point: impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> Result<(Vector<T, D>, Tensor<T, D>), E> + Sync,
-    ) -> Result<(), E> {
-        self.sweep(Some(field), Mode { weights: Weights::Magnitude, ..Mode::BOTH }, out, each_lane(point))
+        let failure = First::none();
+        self.accumulate(Some(field), Mode { weights, ..Mode::BOTH }, out, |group, at, sums| {
+            for (lane, &p) in group.particles.iter().enumerate() {
+                let (value, gradient) = at.lane(lane);
+                match point(p as usize, value, gradient) {
+                    Ok((q, sigma)) => {
+                        for c in 0..D {
+                            sums.value[c][lane] += q[c];
+                            (0..D).for_each(|k| sums.gradient[c][k][lane] += sigma[(c, k)]);
+                        }
+                    }
+                    Err(error) => failure.keep(p as usize, error),
+                }
+            }
+        });
+        failure.check()
     }
 
     /// `out_I += Σ_p value(p) N_I`, for C components: 1 or D.
@@ -154,16 +145,12 @@ impl<const D: usize> Supports<D> {
         out: &mut [Vector<f64, C>],
         value: impl Fn(usize) -> Vector<f64, C> + Sync,
     ) {
-        const { assert!(C == 1 || C == D) };
-        self.pass();
-        let point = |group: Group<'_>, _: &[At<f64, C, D>], sums: &mut [At<f64, C, D>]| {
+        self.accumulate(None, Mode { weights, ..Mode::VALUE }, out, |group, _, sums| {
             for (lane, &p) in group.particles.iter().enumerate() {
                 let value = value(p as usize);
-                (0..C).for_each(|c| sums[0].value[c][lane] = value[c]);
+                (0..C).for_each(|c| sums.value[c][lane] = value[c]);
             }
-        };
-        let mode = Mode { weights, ..Mode::VALUE };
-        either!(self, way => way.sweep::<C>(1, None, mode, bytemuck::cast_slice_mut(out), &point));
+        });
     }
 
     /// Σ u_I N_I at every particle.
@@ -190,12 +177,10 @@ impl<const D: usize> Supports<D> {
     /// assert_eq!(visited, values.len());
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn each_value<const C: usize>(&self, field: &[Vector<f64, C>], mut take: impl FnMut(usize, Vector<f64, C>)) {
+    pub fn each_value<const C: usize>(&self, field: &[Vector<f64, C>], take: impl FnMut(usize, Vector<f64, C>)) {
         const { assert!(C == 1 || C == D) };
-        self.pass();
         let point = |_: usize, at: &[At<f64, C, D>], lane: usize| Vector::from_fn(|c, _| at[0].value[c][lane]);
-        let field = bytemuck::cast_slice(field);
-        either!(self, way => way.each::<_, C>(1, field, Mode::VALUE, &point, &mut take));
+        self.each(1, bytemuck::cast_slice(field), Mode::VALUE, point, take);
     }
 
     /// Calls `take(p, point(p, u_p, ∇u_p))` for every particle, in an order that does not depend on the number of threads.
@@ -219,15 +204,34 @@ impl<const D: usize> Supports<D> {
         &self,
         field: &[Vector<T, D>],
         point: impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> R + Sync,
-        mut take: impl FnMut(usize, R),
+        take: impl FnMut(usize, R),
     ) {
-        self.pass();
         let point = |p: usize, fields: &[At<f64, D, D>], lane: usize| {
             let value = Vector::from_fn(|c, _| T::from_fields(|i| fields[i].value[c][lane]));
             let gradient = Tensor::from_fn(|c, k| T::from_fields(|i| fields[i].gradient[c][k][lane]));
             point(p, value, gradient)
         };
-        either!(self, way => way.each::<_, D>(T::FIELDS, &T::flat(field), Mode::BOTH, &point, &mut take));
+        self.each(T::FIELDS, &T::flat(field), Mode::BOTH, point, take);
+    }
+
+    /// Calls `take(p, point(p, u and L of every field, lane))` for every particle in the order of the groups.
+    fn each<R: Send, const C: usize>(
+        &self,
+        fields: usize,
+        field: &[f64],
+        mode: Mode,
+        point: impl Fn(usize, &[At<f64, C, D>], usize) -> R + Sync,
+        mut take: impl FnMut(usize, R),
+    ) {
+        self.pass();
+        let evaluate = |group: Group<'_>, at: &[At<f64, C, D>]| -> [Option<R>; LANES] {
+            std::array::from_fn(|lane| Some(point(*group.particles.get(lane)? as usize, at, lane)))
+        };
+        let mut take = |group: Group<'_>, results: [Option<R>; LANES]| {
+            let results = results.into_iter().flatten();
+            group.particles.iter().zip(results).for_each(|(&p, result)| take(p as usize, result));
+        };
+        either!(self, way => way.gather(fields, field, mode, &evaluate, &mut take));
     }
 
     /// `point(p, u_p, ∇u_p)` of every particle, in the order of the particles in memory.
@@ -249,27 +253,5 @@ impl<const D: usize> Supports<D> {
         });
         failure.check()?;
         Ok(results.into_iter().flatten().collect())
-    }
-}
-
-/// The point function of a group, made from the function of one particle.
-fn each_lane<T: Real, E, const D: usize>(
-    point: impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> Result<(Vector<T, D>, Tensor<T, D>), E> + Sync,
-) -> impl Fn(Group<'_>, &At<T, D, D>, &mut At<T, D, D>) -> Result<(), (usize, E)> + Sync {
-    move |group, at, sums| {
-        let failure = First::none();
-        for (lane, &p) in group.particles.iter().enumerate() {
-            let (value, gradient) = at.lane(lane);
-            match point(p as usize, value, gradient) {
-                Ok((q, sigma)) => {
-                    for c in 0..D {
-                        sums.value[c][lane] += q[c];
-                        (0..D).for_each(|k| sums.gradient[c][k][lane] += sigma[(c, k)]);
-                    }
-                }
-                Err(error) => failure.keep(p as usize, (p as usize, error)),
-            }
-        }
-        failure.check()
     }
 }

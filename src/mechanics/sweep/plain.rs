@@ -5,7 +5,7 @@ use super::block::Group;
 use super::blocks::Quadratic;
 use super::kernel::At;
 use super::points::{Points, SupportError};
-use super::{Fill, Mode, Point, Visit};
+use super::{Evaluate, Fill, Mode, Point};
 use crate::approximation::{Scratch, ShapeFunction, Support};
 use crate::grid::Grid;
 use crate::lanes::LANES;
@@ -20,7 +20,7 @@ const TASK: usize = 32;
 const BATCH: usize = 1024;
 
 /// The shape functions of all particles, node by node.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(super) struct Plain<const D: usize> {
     /// All particles in order, so that a [`Group`] can borrow its part.
     particles: Vec<u32>,
@@ -106,7 +106,7 @@ impl<const D: usize> Plain<D> {
         point: &Point<'_, C, D>,
     ) {
         let evaluate = |group: Group<'_>| {
-            let at = field.map_or_else(|| vec![At::zero(); fields], |field| self.gather(group, fields, field));
+            let at = field.map_or_else(|| vec![At::zero(); fields], |field| self.gathered(group, fields, field));
             let mut sums = vec![At::<f64, C, D>::zero(); fields];
             point(group, &at, &mut sums);
             sums
@@ -144,37 +144,29 @@ impl<const D: usize> Plain<D> {
         });
     }
 
-    pub(super) fn each<R: Send, const C: usize>(
+    /// Calls `take(group, evaluate(group, u and L))` for every group in order.
+    pub(super) fn gather<R: Send, const C: usize>(
         &self,
         fields: usize,
         field: &[f64],
         _: Mode,
-        point: &Visit<'_, R, C, D>,
-        take: &mut dyn FnMut(usize, R),
+        evaluate: &Evaluate<'_, R, C, D>,
+        take: &mut dyn FnMut(Group<'_>, R),
     ) {
-        let evaluate = |group: Group<'_>| -> Vec<R> {
-            let at = self.gather(group, fields, field);
-            let lanes = group.particles.iter().enumerate();
-            lanes.map(|(lane, &p)| point(p as usize, &at, lane)).collect()
-        };
-        self.in_order(evaluate, |group, results| {
-            group.particles.iter().zip(results).for_each(|(&p, result)| take(p as usize, result));
-        });
+        self.in_order(|group| evaluate(group, &self.gathered(group, fields, field)), take);
     }
 
     pub(super) fn fill_rows(&self, field: &[f64], count: usize, rows: &mut [[f64; LANES]], fill: &Fill<'_, D>) {
         let evaluate = |group: Group<'_>| {
             let mut rows = vec![[0.0; LANES]; count];
-            fill(group, &self.gather(group, 1, field)[0], &mut rows);
+            fill(group, &self.gathered(group, 1, field)[0], &mut rows);
             rows
         };
-        self.in_order(evaluate, |group, filled| {
-            rows[group.number * count..(group.number + 1) * count].copy_from_slice(&filled);
-        });
+        self.in_order(evaluate, |group, filled| rows[group.number * count..][..count].copy_from_slice(&filled));
     }
 
     /// u = Σ u_I N_I and L = Σ u_I ⊗ ∇_r N_I of every field at the particles of a group.
-    fn gather<const C: usize>(&self, group: Group<'_>, fields: usize, field: &[f64]) -> Vec<At<f64, C, D>> {
+    fn gathered<const C: usize>(&self, group: Group<'_>, fields: usize, field: &[f64]) -> Vec<At<f64, C, D>> {
         let mut at = vec![At::<f64, C, D>::zero(); fields];
         for (lane, (node, n, grad_n)) in self.entries_of(group) {
             for (f, at) in at.iter_mut().enumerate() {
@@ -223,7 +215,7 @@ fn lists<A: ShapeFunction, const D: usize>(
     for &p in particles {
         approximation
             .evaluate(grid, &points.positions[p as usize], &mut scratch, &mut support)
-            .map_err(|source| SupportError { particle: p as usize, source })?;
+            .map_err(|source| SupportError { particle: points.id(p as usize), source })?;
         let continued = points.continued.get(&p);
         let nodes = support.nodes.iter().zip(&support.values).zip(&support.gradients);
         let entry = |((&index, &n), &gradient): ((_, &f64), &[f64; D])| {

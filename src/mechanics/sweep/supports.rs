@@ -56,17 +56,8 @@ pub struct Supports<const D: usize> {
     extension: Option<Arc<Extension>>,
 }
 
-impl<const D: usize> Clone for Supports<D> {
-    fn clone(&self) -> Self {
-        let Self { way, grid, nodes, pool, extension, .. } = self;
-        let passes = AtomicU64::new(self.passes());
-        let (way, nodes, pool, extension) = (way.clone(), nodes.clone(), pool.clone(), extension.clone());
-        Self { way, grid: *grid, nodes, passes, pool, extension }
-    }
-}
-
 /// An implementation of the loop over the particles.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(super) enum Way<const D: usize> {
     Plain(Plain<D>),
     Tiled(Tiled<D>),
@@ -139,8 +130,7 @@ impl<const D: usize> Supports<D> {
                 Ok((Self::of_way(Way::Tiled(tiled), grid, &nodes, pool), nodes))
             }
             _ => {
-                let by_id = |error: SupportError| SupportError { particle: points.id(error.particle), ..error };
-                let (plain, nodes) = Plain::new(approximation, grid, points).map_err(by_id)?;
+                let (plain, nodes) = Plain::new(approximation, grid, points)?;
                 Ok((Self::of_way(Way::Plain(plain), grid, &nodes, pool), nodes))
             }
         }

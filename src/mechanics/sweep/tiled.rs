@@ -4,7 +4,7 @@
 //! Particles are taken in the order (cell, id). [Groups and blocks](super) are defined on the page of the module.
 
 use super::block::{Block, Group};
-use super::builder::{Row, block, number};
+use super::builder::{Builder, Row, number};
 use super::columns::Family;
 use super::order::{self, Key};
 use super::points::{Points, SupportError};
@@ -17,7 +17,7 @@ use crate::parallel::First;
 use crate::tensor::Vector;
 
 /// The shape functions of all particles, by axis.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub(super) struct Tiled<const D: usize> {
     pub(super) blocks: Vec<Block>,
     /// Slot of each particle: group · 8 + lane.
@@ -54,28 +54,22 @@ impl<const D: usize> Tiled<D> {
         })?;
         let runs = || keys.chunk_by(|a, b| order::block::<D>(a) == order::block::<D>(b));
         blocks.resize_with(runs().count(), Block::default);
-        let (family, failed) = (Family::new(product), First::none());
-        parallel::for_each_with(blocks.iter_mut().zip(runs()), &|scratch, (place, keys)| match block(
-            family,
-            grid,
-            points,
-            keys,
-            std::mem::take(place),
-            scratch,
-        ) {
-            Ok(built) => *place = built,
-            Err(error) => failed.keep(keys[0].particle as usize, (keys[0].particle as usize, error)),
+        let (builder, failed) = (Builder { family: Family::new(product), grid, points }, First::none());
+        parallel::for_each_with(blocks.iter_mut().zip(runs()), &|scratch, (block, keys)| {
+            if let Err(error) = builder.build(keys, block, scratch) {
+                failed.keep(keys[0].particle as usize, (keys[0].particle as usize, error));
+            }
         });
         failed.check().map_err(|(particle, error)| failure(particle, error))?;
         let mut first = 0;
         for block in &mut blocks {
-            block.groups.first = first;
-            first += block.groups.len();
+            block.first = first;
+            first += block.len();
         }
         let nodes = number(grid, &mut blocks, &mut rows, nodes.into_spare());
         slots.resize(positions.len(), 0);
         for block in &blocks {
-            for group in (0..block.groups.len()).map(|group| block.groups.group(group)) {
+            for group in (0..block.len()).map(|group| block.group(group)) {
                 for (lane, &p) in group.particles.iter().enumerate() {
                     slots[p as usize] = (group.number * LANES + lane) as u32;
                 }
@@ -100,16 +94,16 @@ impl<const D: usize> Tiled<D> {
 
     pub(super) fn each_group(&self, visit: &mut dyn FnMut(Group<'_>)) {
         for block in &self.blocks {
-            (0..block.groups.len()).for_each(|group| visit(block.groups.group(group)));
+            (0..block.len()).for_each(|group| visit(block.group(group)));
         }
     }
 
     pub(super) fn groups(&self) -> usize {
-        self.blocks.last().map_or(0, |last| last.groups.first + last.groups.len())
+        self.blocks.last().map_or(0, |last| last.first + last.len())
     }
 
     pub(super) fn windows(&self) -> Vec<([usize; 3], usize)> {
-        let groups = self.blocks.iter().flat_map(|block| &block.groups.windows);
+        let groups = self.blocks.iter().flat_map(|block| &block.windows);
         groups.map(|group| (group.width.map(usize::from), usize::from(group.lanes))).collect()
     }
 
@@ -117,22 +111,14 @@ impl<const D: usize> Tiled<D> {
         size_of_val(self.slots.as_slice()) + self.blocks.iter().map(Block::bytes).sum::<usize>()
     }
 
-    /// The place of a particle: (block, group in the block, lane).
-    fn place(&self, particle: usize) -> (&Block, usize, usize) {
+    pub(super) fn of(&self, particle: usize) -> Vec<(usize, f64, Vector<f64, D>)> {
         let slot = self.slots[particle] as usize;
         let (group, lane) = (slot / LANES, slot % LANES);
-        let block = &self.blocks[self.blocks.partition_point(|block| block.groups.first <= group) - 1];
-        (block, group - block.groups.first, lane)
-    }
-
-    pub(super) fn of(&self, particle: usize) -> Vec<(usize, f64, Vector<f64, D>)> {
-        let (block, group, lane) = self.place(particle);
-        let mut entries = Vec::new();
-        block.groups.entries::<D>(group, lane, |place, n, grad_n| {
-            if let Ok(at) = block.places.binary_search(&(place as u32)) {
-                entries.push((block.nodes[at] as usize, n, grad_n));
-            }
-        });
-        entries
+        let block = &self.blocks[self.blocks.partition_point(|block| block.first <= group) - 1];
+        let active = |(place, n, grad_n): (usize, f64, _)| {
+            let at = block.places.binary_search(&(place as u32)).ok()?;
+            Some((block.nodes[at] as usize, n, grad_n))
+        };
+        block.entries::<D>(group - block.first, lane).filter_map(active).collect()
     }
 }

@@ -8,7 +8,7 @@ use super::block::{Block, Group};
 use super::blocks::{Quadratic, ScatterBlocks, scatter_blocks};
 use super::kernel::{self, At, Gather, Scatter, Window};
 use super::tiled::Tiled;
-use super::{Fill, Mode, Point, Visit};
+use super::{Evaluate, Fill, Mode, Point};
 use crate::lanes::LANES;
 use crate::parallel;
 use crate::tensor::Tensor;
@@ -52,13 +52,13 @@ impl<const D: usize> Tiled<D> {
             if let Some(field) = field {
                 gather_boxes::<C>(block, field, fields, nodal);
             }
-            for group in 0..block.groups.len() {
-                let mut window = block.groups.window(group);
+            for group in 0..block.len() {
+                let mut window = block.window::<D>(group);
                 if field.is_some() {
                     gather(window, nodal, mode, at);
                 }
                 sums.fill(At::zero());
-                point(block.groups.group(group), at, sums);
+                point(block.group(group), at, sums);
                 if let Some(changed) = mode.weights.changed() {
                     weights.clear();
                     weights.extend(window.weights.iter().map(|row| row.map(changed)));
@@ -87,10 +87,10 @@ impl<const D: usize> Tiled<D> {
     pub(super) fn blocks(&self, out: &mut [Tensor<f64, D>], quadratic: &(dyn Fn(Group<'_>, &mut Quadratic) + Sync)) {
         let numbers = D * D;
         let work = |block: &Block, (): &mut (), buffer: &mut [f64]| {
-            for group in 0..block.groups.len() {
+            for group in 0..block.len() {
                 let mut form = Quadratic::zero();
-                quadratic(block.groups.group(group), &mut form);
-                let window = block.groups.window(group);
+                quadratic(block.group(group), &mut form);
+                let window = block.window::<D>(group);
                 scatter_blocks(ScatterBlocks { window, from: &form, out: buffer });
             }
         };
@@ -145,62 +145,49 @@ impl<const D: usize> Tiled<D> {
         }
     }
 
-    /// Calls `take(p, point(p, u and L, lane))` for every particle in the order of the blocks. At most the results of one wave wait in
-    /// memory.
-    pub(super) fn each<R: Send, const C: usize>(
+    /// Calls `take(group, evaluate(group, u and L))` for every group in order. At most the results of one wave wait in memory.
+    pub(super) fn gather<R: Send, const C: usize>(
         &self,
         fields: usize,
         field: &[f64],
         mode: Mode,
-        point: &Visit<'_, R, C, D>,
-        take: &mut dyn FnMut(usize, R),
+        evaluate: &Evaluate<'_, R, C, D>,
+        take: &mut dyn FnMut(Group<'_>, R),
     ) {
-        let gather = |scratch: &mut Scratch<C, D>, block: &Block, take: &mut dyn FnMut(usize, R)| {
-            gathered(block, field, fields, mode, scratch, |group, at| {
-                for (lane, &p) in group.particles.iter().enumerate() {
-                    take(p as usize, point(p as usize, at, lane));
-                }
-            });
+        let one = |scratch: &mut Scratch<C, D>, block: &Block, take: &mut dyn FnMut(Group<'_>, R)| {
+            gathered(block, field, fields, mode, scratch, |group, at| take(group, evaluate(group, at)));
         };
         if !self.in_parallel() {
             let mut scratch = Scratch::default();
-            self.blocks.iter().for_each(|block| gather(&mut scratch, block, take));
+            self.blocks.iter().for_each(|block| one(&mut scratch, block, take));
             return;
         }
-        let mut waiting: Vec<Vec<(usize, R)>> = self.blocks.iter().take(WAVE).map(|_| Vec::new()).collect();
+        let mut waiting: Vec<Vec<R>> = self.blocks.iter().take(WAVE).map(|_| Vec::new()).collect();
         for blocks in self.blocks.chunks(WAVE) {
-            parallel::for_each_with(blocks.iter().zip(&mut waiting), &|scratch, (block, part)| {
-                gather(scratch, block, &mut |p, result| part.push((p, result)));
+            parallel::for_each_with(blocks.iter().zip(&mut waiting), &|scratch, (block, results)| {
+                one(scratch, block, &mut |_, result| results.push(result));
             });
-            for (p, result) in waiting.iter_mut().flat_map(|part| part.drain(..)) {
-                take(p, result);
+            for (block, results) in blocks.iter().zip(&mut waiting) {
+                results.drain(..).enumerate().for_each(|(group, result)| take(block.group(group), result));
             }
         }
     }
 
     /// Calls `fill(group, L, rows)` for every group. Each group has `count` rows of its own.
-    pub(super) fn fill_rows(&self, field: &[f64], count: usize, rows: &mut [[f64; LANES]], fill: &Fill<'_, D>) {
-        let mut chunks = Vec::with_capacity(self.blocks.len());
-        let mut rest = rows;
-        for block in &self.blocks {
-            let (chunk, behind) = rest.split_at_mut(block.groups.len() * count);
-            chunks.push(chunk);
-            rest = behind;
-        }
-        let one = |scratch: &mut Scratch<D, D>, (block, chunk): (&Block, &mut [[f64; LANES]])| {
-            let mut rows = chunk.chunks_mut(count);
+    pub(super) fn fill_rows(&self, field: &[f64], count: usize, mut rows: &mut [[f64; LANES]], fill: &Fill<'_, D>) {
+        let of_block = |block| Some((block, rows.split_off_mut(..Block::len(block) * count)?));
+        let one = |scratch: &mut Scratch<D, D>, (block, rows): (&Block, &mut [[f64; LANES]])| {
+            let mut rows = rows.chunks_mut(count);
             gathered(block, field, 1, Mode::GRADIENT, scratch, |group, at| {
-                if let Some(rows) = rows.next() {
-                    fill(group, &at[0], rows);
-                }
+                rows.next().into_iter().for_each(|rows| fill(group, &at[0], rows));
             });
         };
-        let both = self.blocks.iter().zip(chunks);
+        let parts = self.blocks.iter().filter_map(of_block);
         if self.in_parallel() {
-            parallel::for_each_with(both, &one);
+            parallel::for_each_with(parts, &one);
         } else {
             let mut scratch = Scratch::default();
-            both.for_each(|both| one(&mut scratch, both));
+            parts.for_each(|part| one(&mut scratch, part));
         }
     }
 }
@@ -250,8 +237,8 @@ fn gathered<const C: usize, const D: usize>(
 ) {
     gather_boxes::<C>(block, field, fields, nodal);
     at.resize(fields, At::zero());
-    for group in 0..block.groups.len() {
-        gather(block.groups.window(group), nodal, mode, at);
-        visit(block.groups.group(group), at);
+    for group in 0..block.len() {
+        gather(block.window::<D>(group), nodal, mode, at);
+        visit(block.group(group), at);
     }
 }

@@ -3,19 +3,17 @@
 
 use super::inertia::LinearizedMass;
 use super::stress::LinearizedStress;
-use super::{
-    BlocksAtPoints, Given, Linearized, LinearizedTerm, ProductAtPoints, Reason, Role, Step, Stress, Sum, Term, summed,
-};
+use super::{Linearized, LinearizedTerm, Role, Step, Stress, Sum, Term, summed};
 use crate::material::Law;
 use crate::mechanics::constitutive::{Inadmissible, Part};
 use crate::mechanics::loads::Rayleigh;
 use crate::mechanics::schemes::Alphas;
-use crate::mechanics::sweep::{Mode, Number};
+use crate::mechanics::sweep::Number;
 use crate::mechanics::transfer::Nodal;
-use crate::tensor::{Tensor, Vector};
+use crate::tensor::Vector;
 
 /// (a M̃ + b K_n) v; absent without inertia.
-pub struct Damping<'a, const D: usize, L> {
+pub(crate) struct Damping<'a, const D: usize, L> {
     rayleigh: Rayleigh,
     step: Step<'a, D, L>,
     /// K_n; `None` if b = 0 or if a particle has det F ≤ 0. In the second case the stress has no value either, and the step fails there.
@@ -32,7 +30,7 @@ impl<'a, const D: usize, L: Law> Damping<'a, D, L> {
     /// The material part of the stiffness at φ_n, the nodal motion since the last grid reset.
     fn stiffness(step: &Step<'a, D, L>) -> Result<LinearizedStress, Inadmissible> {
         let motion: Vec<_> = step.nodal.moved(step.supports.nodes()).collect();
-        Stress::new(step).linearized(&motion, Part::Material)
+        Stress::of(step).linearized(&motion, Part::Material)
     }
 }
 
@@ -43,7 +41,7 @@ impl<const D: usize, L: Law> Damping<'_, D, L> {
         self.step.mass().add_product(self.rayleigh.mass, v, &mut force);
         if let Some((mode, add)) = self.stiffness.as_ref().and_then(|of| of.product_at_points(Some(v))) {
             let mut of_stiffness = vec![Vector::<f64, D>::zeros(); v.len()];
-            self.step.supports.product(v, mode, &mut of_stiffness, add);
+            self.step.supports.accumulate(Some(v), mode, &mut of_stiffness, add);
             force.iter_mut().zip(&of_stiffness).for_each(|(force, more)| *force += more * self.rayleigh.stiffness);
         }
         force
@@ -73,13 +71,12 @@ impl<const D: usize, L: Law> Damping<'_, D, L> {
 }
 
 impl<const D: usize, L: Law> Term<D> for Damping<'_, D, L> {
-    const NAME: &'static str = "damping";
-    const ROLE: Role = Role::Dissipates;
+    fn name(&self) -> &'static str {
+        "damping"
+    }
 
-    fn planned(given: Given<'_, D>) -> Vec<Reason> {
-        let damping = given.loads.damping.filter(|_| given.scheme.has_inertia());
-        let why = |Rayleigh { mass, stiffness }| format!("{mass} M + {stiffness} K; two passes more a residual");
-        vec![(Self::NAME, damping.is_some(), damping.map_or_else(|| "only with damping".into(), why))]
+    fn role(&self) -> Role {
+        Role::Dissipates
     }
 
     fn add_at_nodes<T: Number>(&self, dphi: &[Vector<T, D>], out: &mut [Vector<T, D>]) {
@@ -99,50 +96,16 @@ impl<const D: usize, L: Law> Term<D> for Damping<'_, D, L> {
         out.iter_mut().zip(force).for_each(|(out, force)| *out += force.abs());
     }
 
+    /// α₄ (a M̃ + b K_n)
     fn linearize(&self, _: &[Vector<f64, D>], _: Part) -> LinearizedTerm<'_, D> {
         let Rayleigh { mass, stiffness } = self.rayleigh;
         let a4 = self.step.alphas.a4;
         mutant!("damping: the product has the factor of the acceleration": a4 = self.step.alphas.a1);
-        let mut of_stress = None;
-        if stiffness > 0.0 {
-            of_stress = Some(Self::stiffness(&self.step)?.times(a4 * stiffness));
-        }
         let of_mass = LinearizedMass { mass: self.step.mass(), factor: a4 * mass };
-        Ok(Some(Box::new(LinearizedDamping { of_mass, of_stress })))
-    }
-}
-
-/// α₄ (a M̃ + b K_n)
-struct LinearizedDamping<'a, const D: usize> {
-    of_mass: LinearizedMass<'a, D>,
-    of_stress: Option<LinearizedStress>,
-}
-
-impl<const D: usize> LinearizedDamping<'_, D> {
-    fn each(&self) -> impl Iterator<Item = &dyn Linearized<D>> {
-        let of_mass: &dyn Linearized<D> = &self.of_mass;
-        let of_stress = self.of_stress.as_ref().map(|linearized| linearized as &dyn Linearized<D>);
-        [Some(of_mass), of_stress].into_iter().flatten()
-    }
-}
-
-impl<const D: usize> Linearized<D> for LinearizedDamping<'_, D> {
-    fn add_product_at_nodes(&self, u: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
-        self.each().for_each(|linearized| linearized.add_product_at_nodes(u, out));
-    }
-
-    fn product_at_points(&self, u: Option<&[Vector<f64, D>]>) -> Option<(Mode, ProductAtPoints<'_, D>)> {
-        let (modes, all): (Vec<_>, Vec<_>) = self.each().filter_map(|of| of.product_at_points(u)).unzip();
-        let mode = modes.into_iter().reduce(Mode::and)?;
-        Some((mode, Box::new(move |group, at, sums| all.iter().for_each(|add| add(group, at, sums)))))
-    }
-
-    fn add_blocks_at_nodes(&self, blocks: &mut [Tensor<f64, D>]) {
-        self.each().for_each(|linearized| linearized.add_blocks_at_nodes(blocks));
-    }
-
-    fn blocks_at_points(&self) -> Option<BlocksAtPoints<'_>> {
-        let all: Vec<_> = self.each().filter_map(Linearized::blocks_at_points).collect();
-        Some(Box::new(move |group, form| all.iter().for_each(|add| add(group, form))))
+        let mut addends: Vec<Box<dyn Linearized<D> + '_>> = vec![Box::new(of_mass)];
+        if stiffness > 0.0 {
+            addends.push(Box::new(Self::stiffness(&self.step)?.times(a4 * stiffness)));
+        }
+        Ok(addends)
     }
 }

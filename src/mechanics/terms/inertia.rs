@@ -1,8 +1,6 @@
 //! Inertia, M̃ a with a = α₁ (Δφ − Δφ̂): eq. 33 with the sign corrected.
 
-use super::{
-    AtPoints, BlocksAtPoints, Given, Linearized, LinearizedTerm, ProductAtPoints, Reason, Step, Sum, Term, summed,
-};
+use super::{AtPoints, BlocksAtPoints, Linearized, LinearizedTerm, ProductAtPoints, Step, Sum, Term, summed};
 use crate::mechanics::constitutive::{Inadmissible, Part};
 use crate::mechanics::mass::Mass;
 use crate::mechanics::schemes::Alphas;
@@ -12,7 +10,7 @@ use crate::pooled::Pooled;
 use crate::tensor::{Tensor, Vector, identity, scaled};
 
 /// M̃ a; absent without inertia.
-pub struct Inertia<'a, const D: usize> {
+pub(crate) struct Inertia<'a, const D: usize> {
     mass: Mass<'a, D>,
     nodal: &'a Nodal<D>,
     alphas: Alphas,
@@ -45,16 +43,8 @@ impl<'a, const D: usize> Inertia<'a, D> {
 }
 
 impl<const D: usize> Term<D> for Inertia<'_, D> {
-    const NAME: &'static str = "inertia";
-
-    fn planned(Given { scheme, lumping, .. }: Given<'_, D>) -> Vec<Reason> {
-        let moves = scheme.has_inertia();
-        let consistent = "only for time.lumping < 1; its projection is an iteration";
-        let why = |why: String| if moves { why } else { format!("time.scheme says none: {scheme}") };
-        vec![
-            ("inertia, lumped", moves && lumping > 0.0, why(format!("time.lumping = {lumping}, {scheme}"))),
-            ("inertia, consistent", moves && lumping < 1.0, why(consistent.into())),
-        ]
+    fn name(&self) -> &'static str {
+        "inertia"
     }
 
     fn add_at_nodes<T: Number>(&self, dphi: &[Vector<T, D>], out: &mut [Vector<T, D>]) {
@@ -65,7 +55,7 @@ impl<const D: usize> Term<D> for Inertia<'_, D> {
     fn at_points<T: Number>(&self, _: Part, _: &[Vector<T, D>]) -> Option<(Mode, AtPoints<'_, T, D>)> {
         let add: AtPoints<'_, T, D> = Box::new(|group, at, sums| {
             for (lane, &p) in group.particles.iter().enumerate() {
-                let weight = T::lit(self.alphas.a1 * self.mass.consistent(p as usize).unwrap_or(0.0));
+                let weight = T::lit(self.alphas.a1 * self.mass.consistent(p as usize));
                 mutant!("inertia: the residual lacks the consistent part": weight = T::zero());
                 for c in 0..D {
                     sums.value[c][lane] += weight * (at.value[c][lane] - T::lit(self.predicted[p as usize][c]));
@@ -85,7 +75,7 @@ impl<const D: usize> Term<D> for Inertia<'_, D> {
             let half_a1 = T::lit(0.5 * self.alphas.a1);
             let energy = |p: usize, u: Vector<T, D>, _: Tensor<T, D>| {
                 let u = u - self.predicted[p].map(T::lit);
-                half_a1 * T::lit(self.mass.consistent(p).unwrap_or(0.0)) * u.dot(&u)
+                half_a1 * T::lit(self.mass.consistent(p)) * u.dot(&u)
             };
             self.mass.supports.each_particle(dphi, energy, |_, energy| {
                 sum += energy;
@@ -105,7 +95,7 @@ impl<const D: usize> Term<D> for Inertia<'_, D> {
     }
 
     fn linearize(&self, _: &[Vector<f64, D>], _: Part) -> LinearizedTerm<'_, D> {
-        Ok(Some(Box::new(LinearizedMass { mass: self.mass, factor: self.alphas.a1 })))
+        Ok(vec![Box::new(LinearizedMass { mass: self.mass, factor: self.alphas.a1 })])
     }
 }
 
@@ -125,7 +115,7 @@ impl<const D: usize> Linearized<D> for LinearizedMass<'_, D> {
     fn product_at_points(&self, _: Option<&[Vector<f64, D>]>) -> Option<(Mode, ProductAtPoints<'_, D>)> {
         let add: ProductAtPoints<'_, D> = Box::new(|group, at, sums| {
             for (lane, &p) in group.particles.iter().enumerate() {
-                let weight = self.factor * self.mass.consistent(p as usize).unwrap_or(0.0);
+                let weight = self.factor * self.mass.consistent(p as usize);
                 (0..D).for_each(|c| sums.value[c][lane] += weight * at.value[c][lane]);
             }
         });
@@ -141,7 +131,7 @@ impl<const D: usize> Linearized<D> for LinearizedMass<'_, D> {
     fn blocks_at_points(&self) -> Option<BlocksAtPoints<'_>> {
         let add: BlocksAtPoints<'_> = Box::new(|group, form| {
             for (lane, &p) in group.particles.iter().enumerate() {
-                form.mass[lane] += self.factor * self.mass.consistent(p as usize).unwrap_or(0.0);
+                form.mass[lane] += self.factor * self.mass.consistent(p as usize);
             }
         });
         (self.mass.lumping < 1.0).then_some(add)

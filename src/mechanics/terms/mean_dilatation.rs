@@ -15,8 +15,7 @@
 //! The first part of δσ couples the particles of a cell; the second has the form of a [`ClosedTangent`](crate::material::ClosedTangent).
 
 use super::{
-    AtPoints, BlocksAtPoints, FunctionsAt, Given, Linearized, LinearizedTerm, ProductAtPoints, Reason, Step, Sum, Term,
-    summed,
+    AtPoints, BlocksAtPoints, FunctionsAt, Linearized, LinearizedTerm, ProductAtPoints, Step, Sum, Term, summed,
 };
 use crate::lanes::LANES;
 use crate::material::{Law, MaterialState, VolumeResponse};
@@ -29,7 +28,7 @@ use crate::scalar::Real;
 use crate::tensor::{Tensor, Vector, cofactor, identity, scaled};
 
 /// Σ_p V₀ [U(θ_p) − U(J_p)]; absent if no body has mean dilatation.
-pub struct MeanDilatation<'a, const D: usize, L> {
+pub(crate) struct MeanDilatation<'a, const D: usize, L> {
     step: Step<'a, D, L>,
     cells: Cells,
 }
@@ -96,14 +95,8 @@ impl<'a, const D: usize, L: Law> MeanDilatation<'a, D, L> {
 }
 
 impl<const D: usize, L: Law> Term<D> for MeanDilatation<'_, D, L> {
-    const NAME: &'static str = "mean dilatation";
-
-    fn planned(given: Given<'_, D>) -> Vec<Reason> {
-        let why = match given.averages {
-            false => "only with volumetric = \"mean_dilatation\" of a body",
-            true => "one change of volume for the particles of a cell; a pass more a residual and a product",
-        };
-        vec![(<Self as Term<D>>::NAME, given.averages, why.into())]
+    fn name(&self) -> &'static str {
+        "mean dilatation"
     }
 
     fn at_points<T: Number>(&self, _: Part, dphi: &[Vector<T, D>]) -> Option<(Mode, AtPoints<'_, T, D>)> {
@@ -148,7 +141,7 @@ impl<const D: usize, L: Law> Term<D> for MeanDilatation<'_, D, L> {
         let states = self.states(dphi);
         let (closed, count) = (Form::Closed.rows(D), Form::Closed.rows(D) + 1);
         let mut rows = supports.pool().unspecified(supports.groups() * count, [0.0; LANES]);
-        supports.fill_rows(dphi, count, &mut rows, &|group, at, rows| {
+        supports.fill_rows(dphi, count, &mut rows, |group, at, rows| {
             rows.fill([0.0; LANES]);
             for (lane, &p) in group.particles.iter().enumerate() {
                 let Some(cell) = self.cells.cell(p) else { continue };
@@ -168,7 +161,7 @@ impl<const D: usize, L: Law> Term<D> for MeanDilatation<'_, D, L> {
             }
         });
         let stiffness = states.into_iter().map(|state| state.stiffness).collect();
-        Ok(Some(Box::new(LinearizedMean { cells: &self.cells, supports, rows, stiffness })))
+        Ok(vec![Box::new(LinearizedMean { cells: &self.cells, supports, rows, stiffness })])
     }
 }
 
@@ -198,7 +191,7 @@ impl<const D: usize> LinearizedMean<'_, D> {
     /// k δv of every cell, with δv = Σ V₀ J A : ∇u.
     fn coupling(&self, u: &[Vector<f64, D>]) -> Vec<f64> {
         let mut grown = self.supports.pool().unspecified(self.supports.groups(), [0.0; LANES]);
-        self.supports.fill_rows(u, 1, &mut grown, &|group, at, grown| {
+        self.supports.fill_rows(u, 1, &mut grown, |group, at, grown| {
             let (a, weight) = self.of_group(group.number);
             let mut sum = [0.0; LANES];
             for (a, l) in a.iter().zip(at.gradient.as_flattened()) {

@@ -9,30 +9,29 @@
 //!
 //! [`Equilibrium`](super::residual::Equilibrium) sums the terms of the list. Plans and checks go through the same list.
 
-mod body_force;
-mod carried_over;
 mod damping;
+mod dead_load;
 mod inertia;
 mod mean_dilatation;
+mod planned;
 mod pressure;
 mod stress;
-mod traction;
 
-pub use body_force::BodyForce;
-pub use carried_over::CarriedOver;
-pub use damping::Damping;
-pub use inertia::Inertia;
-pub use mean_dilatation::MeanDilatation;
 pub(crate) use mean_dilatation::linearized_rows;
-pub use pressure::Pressure;
-pub use stress::Stress;
-pub use traction::Traction;
+pub(crate) use planned::planned;
+
+use damping::Damping;
+use dead_load::DeadLoad;
+use inertia::Inertia;
+use mean_dilatation::MeanDilatation;
+use pressure::Pressure;
+use stress::Stress;
 
 use crate::material::Law;
 use crate::mechanics::constitutive::{Inadmissible, Part};
 use crate::mechanics::loads::Loads;
 use crate::mechanics::mass::Mass;
-use crate::mechanics::schemes::{Alphas, Scheme};
+use crate::mechanics::schemes::Alphas;
 use crate::mechanics::sweep::{At, Group, Mode, Number, Quadratic, Supports};
 use crate::mechanics::transfer::Nodal;
 use crate::mechanics::unknowns::Function;
@@ -95,41 +94,28 @@ pub(crate) type BlocksAtPoints<'a> = Box<dyn Fn(Group<'_>, &mut Quadratic) + Syn
 /// A sum, and the sum of the magnitudes of its contributions.
 pub type Sum<T> = (T, f64);
 
-/// The data of a simulation before its first step, from which a term makes its plan.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Given<'a, const D: usize> {
-    pub loads: &'a Loads<D>,
-    pub scheme: &'a dyn Scheme,
-    /// ε
-    pub lumping: f64,
-    /// Whether a body has mean dilatation.
-    pub averages: bool,
-    /// Whether the grid may be reset.
-    pub may_reset: bool,
-}
-
-/// `(name, used, why)`: whether a term, or a part of a term, is used, and the reason.
-pub(crate) type Reason = (&'static str, bool, String);
-
 /// The sum of energies, and the sum of their magnitudes.
 fn summed<T: Number>(energies: impl IntoIterator<Item = T>) -> Sum<T> {
     energies.into_iter().fold((T::zero(), 0.0), |(sum, size), energy| (sum + energy, size + energy.value().abs()))
 }
 
-/// The result of linearising a term; `None` for a dead load.
-pub(crate) type LinearizedTerm<'a, const D: usize> = Result<Option<Box<dyn Linearized<D> + 'a>>, Inadmissible>;
+/// The linearisation of a term: its addends; none for a dead load.
+pub(crate) type LinearizedTerm<'a, const D: usize> = Result<Vec<Box<dyn Linearized<D> + 'a>>, Inadmissible>;
 
 /// A term of the residual R(Δφ).
 pub(crate) trait Term<const D: usize>: Sync {
-    /// The name of the term in checks, plans and reports.
-    const NAME: &'static str;
-    /// The parts of its tangent that can be linearised alone, with their names.
-    const PARTS: &'static [(Part, &'static str)] = &[];
-    /// Where its work goes.
-    const ROLE: Role = Role::Stores;
+    /// The name of the term in checks and reports.
+    fn name(&self) -> &'static str;
 
-    /// The entries of the term in a plan.
-    fn planned(given: Given<'_, D>) -> Vec<Reason>;
+    /// The parts of its tangent that can be linearised alone, with their names.
+    fn parts(&self) -> &'static [(Part, &'static str)] {
+        &[]
+    }
+
+    /// Where its work goes.
+    fn role(&self) -> Role {
+        Role::Stores
+    }
 
     /// Adds the contribution at the nodes.
     fn add_at_nodes<T: Number>(&self, _dphi: &[Vector<T, D>], _out: &mut [Vector<T, D>]) {}
@@ -157,12 +143,12 @@ pub(crate) trait Term<const D: usize>: Sync {
         Ok(())
     }
 
-    /// Linearises the term at Δφ; `None` for a dead load.
+    /// Linearises the term at Δφ.
     ///
     /// # Errors
     /// det F ≤ 0 somewhere.
     fn linearize(&self, _dphi: &[Vector<f64, D>], _part: Part) -> LinearizedTerm<'_, D> {
-        Ok(None)
+        Ok(Vec::new())
     }
 }
 
@@ -195,7 +181,7 @@ pub(crate) trait Linearized<const D: usize>: Sync {
 }
 
 /// Where the work of a term goes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Role {
     /// The work goes into kinetic or strain energy, and back.
     Stores,
@@ -210,161 +196,127 @@ pub enum Role {
 pub struct Piece {
     /// The term.
     pub term: &'static str,
+    /// Where the work of the term goes.
+    pub role: Role,
     /// The part.
     pub part: Part,
     /// The name of the piece.
     pub name: &'static str,
 }
 
-/// Declares [`Terms`] from the list of all terms.
-macro_rules! terms {
-    ($($field:ident: $term:ty),* $(,)?) => {
-        /// The terms of one step. Terms that a scene does not need are `None`.
-        pub struct Terms<'a, const D: usize, L> {
-            $(#[doc = concat!("See [`", stringify!($term), "`].")] pub $field: Option<$term>),*
-        }
+/// A term of any type.
+pub(crate) enum AnyTerm<'a, const D: usize, L> {
+    Inertia(Inertia<'a, D>),
+    Stress(Stress<'a, D, L>),
+    MeanDilatation(MeanDilatation<'a, D, L>),
+    Damping(Damping<'a, D, L>),
+    DeadLoad(DeadLoad<D>),
+    Pressure(Pressure<'a, D>),
+}
 
-        impl<'a, const D: usize, L: Law> Terms<'a, D, L> {
-            /// The terms that act in a step.
-            pub(crate) fn of(step: &Step<'a, D, L>) -> Self {
-                Self { $($field: <$term>::of(step)),* }
-            }
-
-            /// The entries of all terms in a plan.
-            pub(crate) fn planned(given: Given<'_, D>) -> Vec<Reason> {
-                [$(<$term as Term<D>>::planned(given)),*].concat()
-            }
-
-            /// The terms in use, whole and by the parts that can be linearised alone.
-            pub fn pieces(&self) -> Vec<Piece> {
-                let mut pieces = Vec::new();
-                $(if self.$field.is_some() {
-                    let (term, parts) = (<$term as Term<D>>::NAME, <$term as Term<D>>::PARTS);
-                    pieces.push(Piece { term, part: Part::Whole, name: term });
-                    pieces.extend(parts.iter().map(|&(part, name)| Piece { term, part, name }));
-                })*
-                pieces
-            }
-
-            /// Whether a piece is a load.
-            pub(crate) fn is_load(&self, piece: Piece) -> bool {
-                $(if piece.term == <$term as Term<D>>::NAME {
-                    return <$term as Term<D>>::ROLE == Role::Loads;
-                })*
-                false
-            }
-
-            /// Adds the contributions at the nodes of all terms that `picked` selects.
-            pub(crate) fn add_at_nodes<T: Number>(
-                &self,
-                picked: impl Fn(&str, Role) -> bool,
-                dphi: &[Vector<T, D>],
-                out: &mut [Vector<T, D>],
-            ) {
-                $(if let Some(term) = self.$field.as_ref().filter(|_| picked(<$term as Term<D>>::NAME, <$term as Term<D>>::ROLE)) {
-                    term.add_at_nodes(dphi, out);
-                })*
-            }
-
-            /// The contributions at the particles of all terms that `picked` selects.
-            pub(crate) fn at_points<T: Number>(
-                &self,
-                picked: impl Fn(&str, Role) -> bool,
-                part: Part,
-                dphi: &[Vector<T, D>],
-            ) -> Vec<(Mode, AtPoints<'_, T, D>)> {
-                let mut all = Vec::new();
-                $(if let Some(term) = self.$field.as_ref().filter(|_| picked(<$term as Term<D>>::NAME, <$term as Term<D>>::ROLE)) {
-                    all.extend(term.at_points(part, dphi));
-                })*
-                all
-            }
-
-            /// The sum of all energies; `None` if a term has no potential.
-            pub(crate) fn energy<T: Number>(&self, dphi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>> {
-                let (mut sum, mut magnitude) = (T::zero(), 0.0);
-                $(if let Some(term) = &self.$field {
-                    match term.energy(dphi)? {
-                        Ok((value, size)) => {
-                            sum += value;
-                            magnitude += size;
-                        }
-                        Err(error) => return Some(Err(error)),
-                    }
-                })*
-                Some(Ok((sum, magnitude)))
-            }
-
-            pub(crate) fn add_magnitudes_at_nodes(&self, dphi: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
-                $(if let Some(term) = &self.$field {
-                    term.add_magnitudes_at_nodes(dphi, out);
-                })*
-            }
-
-            pub(crate) fn add_sensitivity(
-                &self,
-                dphi: &[Vector<f64, D>],
-                out: &mut [Vector<f64, D>],
-            ) -> Result<(), Inadmissible> {
-                $(if let Some(term) = &self.$field {
-                    term.add_sensitivity(dphi, out)?;
-                })*
-                Ok(())
-            }
-
-            /// Linearises all terms, or one piece.
-            pub(crate) fn linearize(
-                &self,
-                piece: Option<Piece>,
-                dphi: &[Vector<f64, D>],
-            ) -> Result<Vec<Box<dyn Linearized<D> + '_>>, Inadmissible> {
-                let mut all = Vec::new();
-                $(if let Some(term) = self.$field.as_ref().filter(|_| piece.is_none_or(|piece| piece.term == <$term as Term<D>>::NAME)) {
-                    all.extend(term.linearize(dphi, piece.map_or(Part::Whole, |piece| piece.part))?);
-                })*
-                Ok(all)
-            }
+/// The value of an expression for a term of any type. A term has methods that are generic over the number type, so it cannot be `dyn`.
+macro_rules! of_term {
+    ($any:expr, $term:ident => $value:expr) => {
+        match $any {
+            AnyTerm::Inertia($term) => $value,
+            AnyTerm::Stress($term) => $value,
+            AnyTerm::MeanDilatation($term) => $value,
+            AnyTerm::Damping($term) => $value,
+            AnyTerm::DeadLoad($term) => $value,
+            AnyTerm::Pressure($term) => $value,
         }
     };
 }
 
-terms! {
-    inertia: Inertia<'a, D>,
-    stress: Stress<'a, D, L>,
-    mean_dilatation: MeanDilatation<'a, D, L>,
-    damping: Damping<'a, D, L>,
-    body_force: BodyForce<D>,
-    traction: Traction<D>,
-    carried_over: CarriedOver<'a, D>,
-    pressure: Pressure<'a, D>,
-}
+/// The terms of one step.
+pub struct Terms<'a, const D: usize, L>(Vec<AnyTerm<'a, D, L>>);
 
-/// Implements [`Term`] for a dead load f on the nodes: the term −f, with the energy −f·Δφ and no tangent. The last argument is its
-/// [`Role`].
-macro_rules! dead_load {
-    ($load:ty, $name:literal, $role:ident) => {
-        impl<const D: usize> Term<D> for $load {
-            const NAME: &'static str = $name;
-            const ROLE: Role = Role::$role;
+impl<'a, const D: usize, L: Law> Terms<'a, D, L> {
+    /// The terms that act in a step.
+    pub(crate) fn of(step: &Step<'a, D, L>) -> Self {
+        let terms = [
+            Inertia::of(step).map(AnyTerm::Inertia),
+            Some(AnyTerm::Stress(Stress::of(step))),
+            MeanDilatation::of(step).map(AnyTerm::MeanDilatation),
+            Damping::of(step).map(AnyTerm::Damping),
+            DeadLoad::body_force(step).map(AnyTerm::DeadLoad),
+            DeadLoad::traction(step).map(AnyTerm::DeadLoad),
+            DeadLoad::out_of_balance(step).map(AnyTerm::DeadLoad),
+            Pressure::of(step).map(AnyTerm::Pressure),
+        ];
+        Self(terms.into_iter().flatten().collect())
+    }
 
-            fn planned(given: Given<'_, D>) -> Vec<Reason> {
-                Self::reasons(given)
-            }
+    /// The terms in use, whole and by the parts that can be linearised alone.
+    pub fn pieces(&self) -> Vec<Piece> {
+        let mut pieces = Vec::new();
+        for any in &self.0 {
+            let (term, role, parts) = of_term!(any, one => (one.name(), one.role(), one.parts()));
+            pieces.push(Piece { term, role, part: Part::Whole, name: term });
+            pieces.extend(parts.iter().map(|&(part, name)| Piece { term, role, part, name }));
+        }
+        pieces
+    }
 
-            fn add_at_nodes<T: Number>(&self, _: &[Vector<T, D>], out: &mut [Vector<T, D>]) {
-                out.iter_mut().zip(self.0.iter()).for_each(|(out, force)| *out -= force.map(T::lit));
-            }
+    /// The terms that `picked` selects by name and role.
+    fn picked(&self, picked: impl Fn(&str, Role) -> bool) -> impl Iterator<Item = &AnyTerm<'a, D, L>> {
+        self.0.iter().filter(move |any| of_term!(any, term => picked(term.name(), term.role())))
+    }
 
-            fn energy<T: Number>(&self, dphi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>> {
-                let energy = |(force, dphi): (&Vector<f64, D>, &Vector<T, D>)| -force.map(T::lit).dot(dphi);
-                Some(Ok(super::summed(self.0.iter().zip(dphi).map(energy))))
-            }
+    /// Adds the contributions at the nodes of all terms that `picked` selects.
+    pub(crate) fn add_at_nodes<T: Number>(
+        &self,
+        picked: impl Fn(&str, Role) -> bool,
+        dphi: &[Vector<T, D>],
+        out: &mut [Vector<T, D>],
+    ) {
+        self.picked(picked).for_each(|any| of_term!(any, term => term.add_at_nodes(dphi, out)));
+    }
 
-            fn add_magnitudes_at_nodes(&self, _: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
-                out.iter_mut().zip(self.0.iter()).for_each(|(out, force)| *out += force.abs());
+    /// The contributions at the particles of all terms that `picked` selects.
+    pub(crate) fn at_points<T: Number>(
+        &self,
+        picked: impl Fn(&str, Role) -> bool,
+        part: Part,
+        dphi: &[Vector<T, D>],
+    ) -> Vec<(Mode, AtPoints<'_, T, D>)> {
+        self.picked(picked).filter_map(|any| of_term!(any, term => term.at_points(part, dphi))).collect()
+    }
+
+    /// The sum of all energies; `None` if a term has no potential.
+    pub(crate) fn energy<T: Number>(&self, dphi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>> {
+        let (mut sum, mut magnitude) = (T::zero(), 0.0);
+        for any in &self.0 {
+            match of_term!(any, term => term.energy(dphi))? {
+                Ok((value, size)) => {
+                    sum += value;
+                    magnitude += size;
+                }
+                Err(error) => return Some(Err(error)),
             }
         }
-    };
-}
+        Some(Ok((sum, magnitude)))
+    }
 
-use dead_load;
+    pub(crate) fn add_magnitudes_at_nodes(&self, dphi: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
+        self.0.iter().for_each(|any| of_term!(any, term => term.add_magnitudes_at_nodes(dphi, out)));
+    }
+
+    pub(crate) fn add_sensitivity(
+        &self,
+        dphi: &[Vector<f64, D>],
+        out: &mut [Vector<f64, D>],
+    ) -> Result<(), Inadmissible> {
+        self.0.iter().try_for_each(|any| of_term!(any, term => term.add_sensitivity(dphi, out)))
+    }
+
+    /// Linearises all terms, or one piece.
+    pub(crate) fn linearize(&self, piece: Option<Piece>, dphi: &[Vector<f64, D>]) -> LinearizedTerm<'_, D> {
+        let part = piece.map_or(Part::Whole, |piece| piece.part);
+        let mut all = Vec::new();
+        for any in self.picked(|name, _| piece.is_none_or(|piece| piece.term == name)) {
+            all.extend(of_term!(any, term => term.linearize(dphi, part))?);
+        }
+        Ok(all)
+    }
+}

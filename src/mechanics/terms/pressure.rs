@@ -1,14 +1,14 @@
 //! Follower pressure, +p cof(F) N A on the particles of a surface. The tangent is exact, and not symmetric on an open surface.
 
-use super::{FunctionsAt, Given, Linearized, LinearizedTerm, Reason, Role, Step, Sum, Term};
+use super::{FunctionsAt, Linearized, LinearizedTerm, Role, Step, Sum, Term};
 use crate::mechanics::constitutive::{Inadmissible, Part, compose};
-use crate::mechanics::loads::{Pressing, PressurePoint};
+use crate::mechanics::loads::PressurePoint;
 use crate::mechanics::sweep::{Number, Supports};
 use crate::particles::Particles;
 use crate::tensor::{Deformation, Tensor, Vector, cofactor, contract, identity};
 
 /// Σ_Γ p cof(F) N A N_I, which has no potential.
-pub struct Pressure<'a, const D: usize> {
+pub(crate) struct Pressure<'a, const D: usize> {
     particles: &'a Particles<D>,
     supports: &'a Supports<D>,
     points: Vec<PressurePoint<D>>,
@@ -22,12 +22,12 @@ impl<'a, const D: usize> Pressure<'a, D> {
 }
 
 impl<const D: usize> Term<D> for Pressure<'_, D> {
-    const NAME: &'static str = "follower pressure";
-    const ROLE: Role = Role::Loads;
+    fn name(&self) -> &'static str {
+        "follower pressure"
+    }
 
-    fn planned(given: Given<'_, D>) -> Vec<Reason> {
-        let loaded = given.loads.loaded(|pressing| matches!(pressing, Pressing::Pressure(_)));
-        vec![(Self::NAME, loaded > 0, format!("{loaded} loaded particles; makes the tangent unsymmetric"))]
+    fn role(&self) -> Role {
+        Role::Loads
     }
 
     fn add_at_nodes<T: Number>(&self, dphi: &[Vector<T, D>], out: &mut [Vector<T, D>]) {
@@ -64,10 +64,8 @@ impl<const D: usize> Term<D> for Pressure<'_, D> {
                 force: f_inv_t * point.force * at.jacobian,
             }
         };
-        Ok(Some(Box::new(LinearizedPressure {
-            supports: self.supports,
-            points: self.points.iter().map(linearize).collect(),
-        })))
+        let points = self.points.iter().map(linearize).collect();
+        Ok(vec![Box::new(LinearizedPressure { supports: self.supports, points })])
     }
 }
 

@@ -1,29 +1,23 @@
 //! The internal force Σ_p V₀ F S ∇N (eq. 17), and its tangent, geometric and material (eqs. 34, 38).
 
-use super::{
-    AtPoints, BlocksAtPoints, Given, Linearized, LinearizedTerm, ProductAtPoints, Reason, Step, Sum, Term, summed,
-};
+use super::{AtPoints, BlocksAtPoints, Linearized, LinearizedTerm, ProductAtPoints, Step, Sum, Term, summed};
 use crate::lanes::LANES;
 use crate::material::Law;
 use crate::mechanics::constitutive::{AddTo, Form, Laws, Product, add_quadratic, product};
 use crate::mechanics::constitutive::{Inadmissible, Part, compose};
-use crate::mechanics::sweep::{Mode, Number, Supports};
+use crate::mechanics::sweep::{Mode, Number, Supports, Weights};
 use crate::parallel::First;
 use crate::pooled::Pooled;
 use crate::tensor::{Tensor, Vector, identity};
 
 /// Σ_p V₀ F S F_rᵀ ∇_r N_I
-pub struct Stress<'a, const D: usize, L> {
+pub(crate) struct Stress<'a, const D: usize, L> {
     laws: Laws<'a, D, L>,
     supports: &'a Supports<D>,
 }
 
 impl<'a, const D: usize, L: Law> Stress<'a, D, L> {
-    pub(super) fn of(step: &Step<'a, D, L>) -> Option<Self> {
-        Some(Self::new(step))
-    }
-
-    pub(super) fn new(step: &Step<'a, D, L>) -> Self {
+    pub(super) fn of(step: &Step<'a, D, L>) -> Self {
         let Step { particles, bodies, dt, supports, .. } = *step;
         Self { laws: Laws { particles, bodies, dt }, supports }
     }
@@ -39,7 +33,7 @@ impl<'a, const D: usize, L: Law> Stress<'a, D, L> {
         let mut rows = self.supports.pool().unspecified(self.supports.groups() * count, [0.0; LANES]);
         let evaluate = self.laws.tangents(part, form);
         let failure = First::none();
-        self.supports.fill_rows(dphi, count, &mut rows, &|group, at, rows| {
+        self.supports.fill_rows(dphi, count, &mut rows, |group, at, rows| {
             if let Err(error) = evaluate(group, at, rows) {
                 failure.keep(error.particle, error);
             }
@@ -50,11 +44,12 @@ impl<'a, const D: usize, L: Law> Stress<'a, D, L> {
 }
 
 impl<const D: usize, L: Law> Term<D> for Stress<'_, D, L> {
-    const NAME: &'static str = "stress";
-    const PARTS: &'static [(Part, &'static str)] = &[(Part::Geometric, "geometric"), (Part::Material, "material")];
+    fn name(&self) -> &'static str {
+        "stress"
+    }
 
-    fn planned(_: Given<'_, D>) -> Vec<Reason> {
-        vec![("internal force", true, format!("F S of every particle, {D}×{D}"))]
+    fn parts(&self) -> &'static [(Part, &'static str)] {
+        &[(Part::Geometric, "geometric"), (Part::Material, "material")]
     }
 
     fn at_points<T: Number>(&self, part: Part, _: &[Vector<T, D>]) -> Option<(Mode, AtPoints<'_, T, D>)> {
@@ -80,7 +75,7 @@ impl<const D: usize, L: Law> Term<D> for Stress<'_, D, L> {
     /// ‖δP‖ ≤ ‖F‖ ‖ℂ : Fᵀ δF‖ with ‖δF‖ = ‖H‖ + Σ |Δφ| |∇_r N| ‖F_r‖. The response to a change of volume stands for all δF.
     fn add_sensitivity(&self, dphi: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) -> Result<(), Inadmissible> {
         let particles = self.laws.particles;
-        self.supports.assemble_magnitudes(dphi, out, |p, _, g| {
+        self.supports.assemble(dphi, Weights::Magnitude, out, |p, _, g| {
             let h_r = &particles.reference().displacement_gradient[p];
             let id = particles.id[p] as usize;
             let at = particles.state(p, self.laws.dt).deformed(compose(&g, h_r)).admissible();
@@ -94,7 +89,7 @@ impl<const D: usize, L: Law> Term<D> for Stress<'_, D, L> {
     }
 
     fn linearize(&self, dphi: &[Vector<f64, D>], part: Part) -> LinearizedTerm<'_, D> {
-        Ok(Some(Box::new(self.linearized(dphi, part)?)))
+        Ok(vec![Box::new(self.linearized(dphi, part)?)])
     }
 }
 

@@ -87,7 +87,12 @@ impl<const D: usize> Nodal<D> {
     pub fn fit(particles: &Particles<D>, supports: &Supports<D>) -> Self {
         let mass = lumped(particles, supports);
         let mut fields = affine(particles, supports, &mass, [&particles.velocity, &particles.acceleration]);
-        fields.iter_mut().for_each(|field| aggregate(particles, supports, &mass, field));
+        // E û with the same momentum as u: Eᵀ m û = Eᵀ (m u).
+        let followers = followers(supports);
+        for u in fields.iter_mut().filter(|_| !followers.is_empty()) {
+            u.iter_mut().zip(&mass).for_each(|(u, &m)| *u *= m);
+            divide(particles, &followers, &mass, u);
+        }
         let [velocity, acceleration] = fields;
         Self { mass, velocity, acceleration, ..Self::default() }
     }
@@ -157,8 +162,7 @@ impl<const D: usize> Nodal<D> {
     pub fn accelerate(&mut self, particles: &Particles<D>, supports: &Supports<D>, unbalanced: &[Vector<f64, D>]) {
         self.acceleration.iter_mut().zip(unbalanced).for_each(|(a, r)| *a = -r);
         mutant!("transfer: loads at t = 0 push the wrong way": { self.acceleration.iter_mut().for_each(|a| *a = -*a); });
-        let followers = followers(supports);
-        divide(particles, &followers, &self.mass, &mut self.acceleration);
+        divide(particles, &followers(supports), &self.mass, &mut self.acceleration);
     }
 
     /// Applies E to velocity and acceleration, so that outer nodes follow the prescribed values of inner nodes.
@@ -194,15 +198,6 @@ impl<const D: usize> Nodal<D> {
             overwritten.acceleration[dof.node][dof.component] = dof.step.acceleration_start;
         }
         overwritten
-    }
-}
-
-/// Replaces the field `u` by E û with the same momentum: Eᵀ m û = Eᵀ (m u).
-fn aggregate<const D: usize>(particles: &Particles<D>, supports: &Supports<D>, mass: &[f64], u: &mut [Vector<f64, D>]) {
-    let followers = followers(supports);
-    if !followers.is_empty() {
-        u.iter_mut().zip(mass).for_each(|(u, &m)| *u *= m);
-        divide(particles, &followers, mass, u);
     }
 }
 

@@ -11,7 +11,7 @@ use crate::mechanics::smoothing::Smoothing;
 use crate::mechanics::sweep::Supports;
 use crate::mechanics::unknowns::Unknowns;
 use crate::particles::{Body, Particles};
-use crate::pooled::Pooled;
+use crate::pooled::{Pool, Pooled};
 use crate::tensor::Vector;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -105,14 +105,11 @@ impl<'a, const D: usize> Update<'a, D> {
             mutant!("transfer: the blow of a wall contains the forces": by_forces = 0.0);
             let literal = !dof.moving && walls == WallUpdate::Literal;
             mutant!("transfer: moving walls count as resting ones": literal = walls == WallUpdate::Literal);
-            (*delta_v, *delta_a) = if literal {
-                (0.0, 0.0)
-            } else {
-                (
-                    dof.step.velocity_end - projected.velocity[node][i],
-                    dof.step.acceleration_end - projected.acceleration[node][i],
-                )
-            };
+            (*delta_v, *delta_a) = (0.0, 0.0);
+            if !literal {
+                *delta_v = dof.step.velocity_end - projected.velocity[node][i];
+                *delta_a = dof.step.acceleration_end - projected.acceleration[node][i];
+            }
             *impulse = nodal.mass[node] * (*delta_v - by_forces);
         }
         let mut kept = None;
@@ -203,18 +200,23 @@ impl<'a, const D: usize> Update<'a, D> {
         self.kept.as_deref().unwrap_or(self.dphi)
     }
 
-    /// φ, v and a of the nodes at the end of the step, from the state `projected`.
-    pub fn end(&self, projected: &Nodal<D>) -> Nodal<D> {
-        let sum = |field: &Pooled<Vector<f64, D>>, delta: &Pooled<Vector<f64, D>>| {
-            field.pool().collect(field.iter().zip(delta).map(|(field, delta)| field + delta))
+    /// The nodal state at the end of the step, without the mass, from the state `projected`.
+    pub(crate) fn end(&self, projected: &Nodal<D>, pool: &Pool) -> Nodal<D> {
+        let sum = |field: &[Vector<f64, D>], delta: &[Vector<f64, D>]| {
+            pool.collect(field.iter().zip(delta).map(|(field, delta)| field + delta))
         };
         Nodal {
             velocity: sum(&projected.velocity, &self.delta_velocity),
             acceleration: sum(&projected.acceleration, &self.delta_acceleration),
-            motion: projected.velocity.pool().collect(self.motion().iter().copied()),
+            motion: pool.collect(self.motion().iter().copied()),
             out_of_balance: projected.out_of_balance.clone(),
             ..Nodal::default()
         }
+    }
+
+    /// Δφ/Δt
+    pub(crate) fn rate(&self, dt: f64) -> Vec<Vector<f64, D>> {
+        self.dphi.iter().map(|dphi| dphi / dt).collect()
     }
 
     /// The particle with the smallest id of those that would leave the grid: its id, and its position outside.
@@ -248,6 +250,7 @@ impl<'a, const D: usize> Update<'a, D> {
         let plastic_strain: Vec<Option<usize>> = bodies.iter().map(place).collect();
         let (mut plastic, mut yielding) = (0.0, 0.0);
         particles.dilatation = dilatation::after(particles, bodies, supports, self.motion());
+        let mut next = Vec::with_capacity(remembered);
         let Particles {
             position, velocity, acceleration, displacement_gradient, volume, memory, body, reference, ..
         } = particles;
@@ -267,29 +270,25 @@ impl<'a, const D: usize> Update<'a, D> {
                     let memory = &mut memory[p * remembered..(p + 1) * remembered];
                     let (at, _) = MaterialState::new(displacement_gradient[p]).admissible_or_rest();
                     let body = body[p] as usize;
-                    let next = bodies[body].law.updated_variables(&at.in_step(dt, memory));
+                    next.clear();
+                    next.extend_from_slice(memory);
+                    bodies[body].law.update_variables(&at.in_step(dt, memory), &mut next);
                     if let Some(place) = plastic_strain[body] {
                         plastic += volume[p];
                         yielding += if next.get(place) > memory.get(place) { volume[p] } else { 0.0 };
                     }
-                    for (variable, next) in memory.iter_mut().zip(next) {
-                        *variable = next;
-                    }
+                    memory.copy_from_slice(&next);
                 }
             },
         );
-        let committed = Committed { strain: largest, yielding: if plastic > 0.0 { yielding / plastic } else { 0.0 } };
-        if self.delta_velocity.is_empty() {
-            return committed;
-        }
-        let [changed_v, changed_a] = self.smoothed.unwrap_or_default();
-        for (field, delta, changed) in
-            [(velocity, &self.delta_velocity, changed_v), (acceleration, &self.delta_acceleration, changed_a)]
-        {
-            supports.each_value(delta, |p, delta| {
+        // Without inertia there are no increments.
+        let increments = [(velocity, self.delta_velocity), (acceleration, self.delta_acceleration)];
+        let with_changes = increments.into_iter().zip(self.smoothed.unwrap_or_default());
+        for ((field, delta), changed) in with_changes.filter(|((_, delta), _)| !delta.is_empty()) {
+            supports.each_value(&delta, |p, delta| {
                 field[p] += changed.get(p).map_or(delta, |changed| delta + changed);
             });
         }
-        committed
+        Committed { strain: largest, yielding: if plastic > 0.0 { yielding / plastic } else { 0.0 } }
     }
 }

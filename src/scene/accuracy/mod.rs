@@ -10,10 +10,13 @@ pub use table::{Level, levels};
 
 use super::body::Body;
 use super::grid::GridBox;
+use super::overrides::next;
+use super::place::steps;
+use super::time::word;
 use crate::problems::Problems;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use serde_json::{Value, json};
+use serde_json::Value;
 use std::fmt::{self, Display};
 
 /// The wanted accuracy of the results.
@@ -58,12 +61,7 @@ impl Accuracy {
 /// The accuracy as a scene writes it.
 impl Display for Accuracy {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Draft => f.write_str("\"draft\""),
-            Self::Standard => f.write_str("\"standard\""),
-            Self::Reference => f.write_str("\"reference\""),
-            Self::Error(error) => write!(f, "{{\"error\": {error}}}"),
-        }
+        f.write_str(&word(self))
     }
 }
 
@@ -98,7 +96,12 @@ pub(super) fn courant(bodies: &[Body], spacing: f64, time: f64) -> Option<f64> {
 /// The target error is outside the table, or a needed length or speed is not in the scene.
 pub(super) fn set_keys(scene: &mut Value) -> Result<Vec<Chosen>, Problems> {
     let Some(accuracy) = part::<Accuracy>(&scene["accuracy"]) else { return Ok(Vec::new()) };
-    let level = accuracy.level().ok_or_else(|| outside(accuracy))?;
+    let mut problems = Problems::default();
+    if let Accuracy::Error(error) = accuracy {
+        let [least, greatest] = table::range();
+        problems.between("accuracy.error", error, least, greatest);
+    }
+    let Some(level) = accuracy.level() else { return Err(problems) };
     let Some(bodies) = part::<Vec<Body>>(&scene["bodies"]) else { return Ok(Vec::new()) };
     let mut setter = KeySetter { scene, chosen: Vec::new() };
     for (key, value) in level.keys() {
@@ -114,16 +117,13 @@ pub(super) fn set_keys(scene: &mut Value) -> Result<Vec<Chosen>, Problems> {
         let mut with_any = setter.scene["grid"].clone();
         with_any["spacing"] = 1.into();
         let Some(grid) = part::<GridBox>(&with_any) else { return Ok(setter.chosen) };
-        let spacing =
-            spacing::fitting(&grid, &bodies, level.cells).map_err(|why| needed("grid.spacing", accuracy, &why))?;
-        setter.set("grid.spacing", spacing.into());
+        let spacing = spacing::fitting(&grid, &bodies, level.cells);
+        setter.set("grid.spacing", spacing.map_err(|why| needed("grid.spacing", accuracy, &why))?.into());
     }
     if setter.lacks("time", "step") {
         let spacing = setter.scene["grid"]["spacing"].as_f64().filter(|h| *h > 0.0 && h.is_finite());
-        let (Some(spacing), Some(end)) = (spacing, setter.scene["time"]["end"].as_f64().filter(|end| *end > 0.0))
-        else {
-            return Ok(setter.chosen);
-        };
+        let end = setter.scene["time"]["end"].as_f64().filter(|end| *end > 0.0);
+        let (Some(spacing), Some(end)) = (spacing, end) else { return Ok(setter.chosen) };
         if has_load_steps(setter.scene) {
             return Err(needed("time.step", accuracy, "load steps of a scene without inertia have no natural length"));
         }
@@ -147,14 +147,6 @@ fn part<T: for<'de> Deserialize<'de>>(value: &Value) -> Option<T> {
     T::deserialize(value).ok()
 }
 
-fn outside(accuracy: Accuracy) -> Problems {
-    let Accuracy::Error(error) = accuracy else { return Problems::default() };
-    let mut problems = Problems::default();
-    let [least, greatest] = table::range();
-    problems.between("accuracy.error", error, least, greatest);
-    problems
-}
-
 fn needed(key: &str, accuracy: Accuracy, why: &str) -> Problems {
     let mut problems = Problems::default();
     problems.refuse("accuracy", accuracy, format_args!("it would choose {key}, but {why}; give {key}"));
@@ -175,30 +167,19 @@ impl KeySetter<'_> {
 
     /// Sets the key `a.b.c` if it is not given. Absent sections are created. A section that is neither object nor list stays unchanged.
     fn set(&mut self, key: &str, value: Value) {
-        let mut here = &mut *self.scene;
-        let mut steps = key.split('.').peekable();
-        while let Some(step) = steps.next() {
-            let next = match here {
-                Value::Array(list) => step.parse().ok().and_then(|i: usize| list.get_mut(i)),
-                Value::Object(object) if steps.peek().is_none() => {
-                    if !object.contains_key(step) {
-                        object.insert(step.to_owned(), value.clone());
-                        self.chosen.push(Chosen { key: key.to_owned(), value });
-                    }
-                    return;
-                }
-                Value::Object(object) => Some(object.entry(step).or_insert_with(|| json!({}))),
-                _ => None,
-            };
-            let Some(next) = next else { return };
-            here = next;
+        if self.scene.pointer(&format!("/{}", key.replace('.', "/"))).is_some() {
+            return;
         }
+        let Ok(place) = steps(key).iter().try_fold(&mut *self.scene, next) else { return };
+        *place = value.clone();
+        self.chosen.push(Chosen { key: key.to_owned(), value });
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use serde_json::json;
 
     #[test]
     fn a_key_that_is_given_stays_and_so_does_what_holds_it() {

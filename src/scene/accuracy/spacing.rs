@@ -5,7 +5,6 @@ use crate::problems::Problems;
 use crate::scene::body::Body;
 use crate::scene::grid::GridBox;
 use crate::scene::shape::Shape;
-use crate::tensor::Vector;
 
 /// Distance, in spacings, within which a face counts as on a node.
 const ON_NODE: f64 = 1e-6;
@@ -22,18 +21,9 @@ const NO_BODY: &str = "there is no body";
 /// The largest spacing that divides all edges of the box and puts at least `cells` cells across the smallest extent of every body. If a
 /// spacing up to twice as fine also puts nodes on the faces of all bodies that are boxes, that one is taken. Or the reason why there is none.
 pub(super) fn fitting(grid: &GridBox, bodies: &[Body], cells: f64) -> Result<f64, String> {
-    match grid.dimension() {
-        1 => fitting_in::<1>(grid, bodies, cells),
-        2 => fitting_in::<2>(grid, bodies, cells),
-        3 => fitting_in::<3>(grid, bodies, cells),
-        _ => Err(NO_BOX.to_owned()),
-    }
-}
-
-fn fitting_in<const D: usize>(grid: &GridBox, bodies: &[Body], cells: f64) -> Result<f64, String> {
-    let origin = grid.origin();
-    let sound = origin.len() == D && grid.size.iter().all(|&size| size > 0.0 && size.is_finite());
-    if !sound || !origin.iter().all(|x| x.is_finite()) {
+    let (origin, dimension) = (grid.origin(), grid.dimension());
+    let sound = grid.size.iter().all(|&size| size > 0.0 && size.is_finite()) && origin.iter().all(|x| x.is_finite());
+    if !sound || origin.len() != dimension || !(1..=3).contains(&dimension) {
         return Err(NO_BOX.to_owned());
     }
     let mut extent = f64::INFINITY;
@@ -44,9 +34,8 @@ fn fitting_in<const D: usize>(grid: &GridBox, bodies: &[Body], cells: f64) -> Re
         let shape = body.shape.as_ref();
         let shape = shape.ok_or_else(|| format!("how large the body {name:?} is stands in its file of particles"))?;
         let no_extent = || format!("the body {name:?} has no extent inside the grid");
-        let built = shape.build::<D>().ok_or_else(no_extent)?;
-        let (min, max): (Vector<f64, D>, Vector<f64, D>) = built.bounding_box();
-        for k in 0..D {
+        let [min, max] = shape.check(&mut Problems::default(), "", dimension).ok_or_else(no_extent)?;
+        for k in 0..dimension {
             let (low, high) = ((min[k] - origin[k]).max(0.0), (max[k] - origin[k]).min(grid.size[k]));
             if high <= low {
                 return Err(no_extent());
@@ -57,36 +46,34 @@ fn fitting_in<const D: usize>(grid: &GridBox, bodies: &[Body], cells: f64) -> Re
             }
         }
     }
-    let coarsest = extent / cells;
-    let shortest = grid.size.iter().copied().fold(f64::INFINITY, f64::min);
-    let fewest = (shortest / coarsest - ON_NODE).ceil().max(1.0);
     if bodies.is_empty() {
         return Err(NO_BODY.to_owned());
     }
+    let coarsest = extent / cells;
+    let shortest = grid.size.iter().copied().fold(f64::INFINITY, f64::min);
+    let fewest = (shortest / coarsest - ON_NODE).ceil().max(1.0);
     if fewest >= MOST_CELLS {
         return Err(NO_BOX.to_owned());
     }
     let fewest = fewest as usize;
     let divides = |h: f64| GridBox { spacing: h, ..grid.clone() }.cells().is_some();
     let on_node = |x: f64, h: f64| (x / h - (x / h).round()).abs() < ON_NODE;
-    let mut candidates =
-        (fewest..=MAX_REFINEMENT * fewest).map(|n| shortest / n as f64).filter(|&h| divides(h)).peekable();
-    let first = candidates.peek().copied();
-    let found = candidates.find(|&h| faces.iter().all(|&x| on_node(x, h))).or(first);
+    let spacings = (fewest..=MAX_REFINEMENT * fewest).map(|n| shortest / n as f64).filter(|&h| divides(h));
+    let found = spacings.clone().find(|&h| faces.iter().all(|&x| on_node(x, h))).or(spacings.clone().next());
     let finest = coarsest / MAX_REFINEMENT as f64;
     found.ok_or_else(|| format!("no spacing between {finest:.4e} and {coarsest:.4e} divides every edge of the grid"))
 }
 
 /// The greatest speed of pressure waves in the undeformed bodies, c = √(M/ρ), M = Λ + 2G in isotropic solids.
 pub(super) fn speed(bodies: &[Body]) -> Result<f64, String> {
-    let mut greatest: f64 = 0.0;
+    let mut greatest = None;
     for body in bodies {
         let law = body.material.law(&mut Problems::default(), "material");
         let speed = law.map_or(f64::NAN, |law| (p_wave_modulus(&law) / body.density).sqrt());
         if !(speed > 0.0 && speed.is_finite()) {
             return Err(format!("the constants or the density of the body {:?} give no speed of sound", body.name));
         }
-        greatest = greatest.max(speed);
+        greatest = Some(speed.max(greatest.unwrap_or(0.0)));
     }
-    if greatest > 0.0 { Ok(greatest) } else { Err(NO_BODY.to_owned()) }
+    greatest.ok_or(NO_BODY.to_owned())
 }

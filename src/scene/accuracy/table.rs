@@ -77,10 +77,10 @@ pub(super) fn between(error: f64) -> Option<Level> {
     }
     let at = LEVELS.iter().position(|level| level.error <= error)?;
     let level = LEVELS[at];
-    let before = match at.checked_sub(1).map(|at| LEVELS[at]) {
-        Some(before) if before.error.is_finite() => before,
-        _ => return Some(level),
-    };
+    let before = LEVELS[at.saturating_sub(1)];
+    if before.error.is_infinite() {
+        return Some(level);
+    }
     let share = (error / level.error).ln() / (before.error / level.error).ln();
     Some(Level { name: None, error, cells: level.cells * (before.cells / level.cells).powf(share), ..level })
 }

@@ -4,15 +4,15 @@
 mod tests;
 
 use super::vector::{axpy, dot, norm, scaled};
-use super::{InvalidSetting, LinearError, LinearOperator, LinearOutcome, LinearReport, begin, finite, true_residual};
+use super::{InvalidSetting, LinearError, LinearOperator, LinearOutcome, LinearReport, begin, true_residual};
 use crate::pooled::{Pool, Pooled};
 
 /// A vector is orthogonalised a second time if the first time leaves less than this part of it: 1/√2 (Daniel, Gragg, Kaufman,
 /// Stewart 1976).
 const REORTHOGONALISE: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
-/// The Krylov space is exhausted if orthogonalisation leaves less than this multiple of eps of a vector.
-const EXHAUSTED: f64 = 8.0;
+/// The Krylov space is exhausted if orthogonalisation leaves less than this part of a vector.
+const EXHAUSTED: f64 = 8.0 * f64::EPSILON;
 
 /// A whole cycle that leaves more than this part of the residual is stagnation. A thousand such cycles gain a factor e.
 const STAGNATION: f64 = 0.999;
@@ -30,12 +30,6 @@ pub struct GmresSettings {
     /// Iterations between restarts, at least 1. One vector is stored for each iteration, and one more. After a cycle that gains next to
     /// nothing, cycles are twice as long.
     pub restart: usize,
-}
-
-impl Default for GmresSettings {
-    fn default() -> Self {
-        Self { relative_tolerance: 1e-8, max_iterations: 1000, restart: 30 }
-    }
 }
 
 /// Solves A x = b from x = 0 by GMRES(m) on A M⁻¹. Its residual is the true residual.
@@ -66,7 +60,8 @@ impl Default for GmresSettings {
 /// }
 ///
 /// let mut x = [0.0; 2];
-/// let report = gmres(&Turn, &Identity, &[-6.0, 8.0], &mut x, &GmresSettings::default(), &Pool::default())?;
+/// let settings = GmresSettings { relative_tolerance: 1e-8, max_iterations: 10, restart: 30 };
+/// let report = gmres(&Turn, &Identity, &[-6.0, 8.0], &mut x, &settings, &Pool::default())?;
 /// // Without rounding, a matrix of order n takes n iterations.
 /// assert!(report.converged() && report.iterations == 2);
 /// assert!((x[0] - 4.0).abs() < 1e-15 && (x[1] - 3.0).abs() < 1e-15, "{x:?}");
@@ -83,9 +78,8 @@ pub fn gmres(
     settings: &GmresSettings,
     workspace: &Pool,
 ) -> Result<LinearReport, LinearError> {
-    InvalidSetting::check_tolerance("relative_tolerance", settings.relative_tolerance)?;
-    InvalidSetting::check_restart(settings.restart)?;
-    let (mut report, b_norm) = begin(rhs, solution)?;
+    InvalidSetting::check(settings.restart >= 1, "restart", settings.restart as f64, "at least 1")?;
+    let (mut report, b_norm) = begin(rhs, solution, settings.relative_tolerance)?;
     if b_norm == 0.0 {
         return Ok(report);
     }
@@ -103,16 +97,16 @@ pub fn gmres(
             return Ok(report);
         }
         let length = restart.min(settings.max_iterations - report.iterations);
-        let (taken, promised) = cycle(operator, preconditioner, &r, r_norm, target, length, &mut correction)
-            .map_err(|error| error.after(report.iterations))?;
+        let (taken, promised) =
+            cycle(operator, preconditioner, &r, r_norm, target, length, &mut correction).map_err(|at| {
+                LinearError::NotFinite { what: "the norm of a Krylov vector", iteration: report.iterations + at }
+            })?;
         report.iterations += taken;
-        report.products += taken + 1;
+        report.products += taken;
         trial.copy_from_slice(solution);
         mutant!("solver: a restart of GMRES forgets the solution so far": { trial.fill(0.0); });
         axpy(1.0, &correction, &mut trial);
-        finite(norm(&trial), "the norm of the solution", report.iterations)?;
-        let trial_norm =
-            finite(true_residual(operator, rhs, &trial, &mut r), "the norm of the residual", report.iterations)?;
+        let trial_norm = true_residual(operator, rhs, &trial, &mut r, &mut report)?;
         let (before, fell) = (r_norm, trial_norm / r_norm);
         if fell < 1.0 {
             solution.copy_from_slice(&trial);
@@ -134,6 +128,9 @@ pub fn gmres(
 
 /// One cycle of at most `length` iterations on the residual `r` of norm `r_norm`, until its norm is `target`. Writes the correction of x.
 /// Returns the number of iterations and the residual norm that the rotations predict.
+///
+/// # Errors
+/// The iteration at which a Krylov vector is not finite.
 fn cycle(
     operator: &dyn LinearOperator,
     preconditioner: &dyn LinearOperator,
@@ -142,29 +139,25 @@ fn cycle(
     target: f64,
     length: usize,
     correction: &mut [f64],
-) -> Result<(usize, f64), LinearError> {
+) -> Result<(usize, f64), usize> {
     let fresh = || r.pool().filled(r.len(), 0.0);
     let mut v = fresh();
     scaled(1.0 / r_norm, r, &mut v);
     // The basis grows by one vector an iteration, so a cycle that ends early allocates no more than it needs.
     let mut basis: Vec<Pooled<f64>> = Vec::new();
-    let exhausted_below = EXHAUSTED * f64::EPSILON;
-    let mut triangle = Triangle {
-        columns: Vec::new(),
-        rotations: Vec::new(),
-        g: Vec::new(),
-        last: r_norm,
-        negligible: exhausted_below,
-    };
+    let mut triangle = Triangle { last: r_norm, ..Triangle::default() };
     for iteration in 0..length {
         let mut w = fresh();
         // `correction` holds M⁻¹ v meanwhile.
         preconditioner.apply(&v, correction);
         operator.apply(correction, &mut w);
         basis.push(v);
-        let w_norm = finite(norm(&w), "the norm of a Krylov vector", iteration)?;
+        let w_norm = norm(&w);
+        if !w_norm.is_finite() {
+            return Err(iteration);
+        }
         let (column, left) = orthogonalise(&mut w, w_norm, &basis);
-        let exhausted = left <= exhausted_below * w_norm;
+        let exhausted = left <= EXHAUSTED * w_norm;
         triangle.push(column, if exhausted { 0.0 } else { left });
         if exhausted || triangle.residual() <= target {
             break;
@@ -201,6 +194,7 @@ fn orthogonalise(w: &mut [f64], w_norm: f64, basis: &[Pooled<f64>]) -> (Vec<f64>
 }
 
 /// The Hessenberg matrix of a cycle. Givens rotations make it triangular, column by column.
+#[derive(Default)]
 struct Triangle {
     /// Column j has j + 1 entries, the diagonal last.
     columns: Vec<Vec<f64>>,
@@ -210,8 +204,6 @@ struct Triangle {
     g: Vec<f64>,
     /// The entry of the rotated right-hand side below the triangle: the residual norm up to sign.
     last: f64,
-    /// A pivot below this part of the largest one is round-off.
-    negligible: f64,
 }
 
 impl Triangle {
@@ -245,9 +237,9 @@ impl Triangle {
     fn solve(&self) -> Vec<f64> {
         let diagonal = |j: usize| self.columns[j][j];
         let largest = (0..self.columns.len()).map(diagonal).fold(0.0, f64::max);
-        // Only an exhausted space of a singular operator ends in a zero pivot.
+        // Only an exhausted space of a singular operator ends in a pivot that is zero to round-off.
         let mut n = self.columns.len();
-        while n > 0 && diagonal(n - 1) <= self.negligible * largest {
+        while n > 0 && diagonal(n - 1) <= EXHAUSTED * largest {
             n -= 1;
         }
         let mut y = self.g[..n].to_vec();

@@ -156,8 +156,7 @@ fn rotations_solve_the_least_squares_problem() {
     let (n, r_norm) = (6, 2.5);
     let entries = irregular(n * (n + 1));
     let h = |i: usize, j: usize| if i <= j + 1 { entries[i * n + j] } else { 0.0 };
-    let mut triangle =
-        Triangle { columns: vec![], rotations: vec![], g: vec![], last: r_norm, negligible: f64::EPSILON };
+    let mut triangle = Triangle { last: r_norm, ..Triangle::default() };
     for j in 0..n {
         triangle.push((0..=j).map(|i| h(i, j)).collect(), h(j + 1, j));
     }

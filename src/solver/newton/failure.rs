@@ -5,7 +5,7 @@ use crate::solver::{InvalidSetting, LinearError, LinearReport};
 
 /// Newton's method found no solution. x is then the last accepted iterate.
 #[derive(Debug, thiserror::Error)]
-#[error("Newton's method stopped after {} iterations", history.iterations.len())]
+#[error("Newton's method stopped after {} iterations{}", history.iterations.len(), at(history))]
 pub struct NewtonError<E: std::error::Error + 'static> {
     /// The cause.
     #[source]
@@ -14,7 +14,11 @@ pub struct NewtonError<E: std::error::Error + 'static> {
     pub history: Box<NewtonHistory>,
 }
 
-/// The cause for which Newton's method found no solution. Iterations are counted from 1, and 0 is the initial guess.
+fn at(history: &NewtonHistory) -> String {
+    history.residual().map_or_else(String::new, |residual| format!(", at the residual {residual:e}"))
+}
+
+/// The cause for which Newton's method found no solution. The history has the number of iterations and the ‖R‖ reached.
 #[derive(Debug, thiserror::Error)]
 pub enum NewtonFailure<E: std::error::Error + 'static> {
     /// A setting outside its range.
@@ -31,63 +35,38 @@ pub enum NewtonFailure<E: std::error::Error + 'static> {
         source: E,
     },
     /// An end was requested; see [`is_stopped`](crate::solver::NonlinearProblem::is_stopped).
-    #[error("it was stopped before iteration {iteration}")]
-    Stopped {
-        /// The iteration.
-        iteration: usize,
-    },
+    #[error("it was stopped before the next iteration")]
+    Stopped,
     /// NaN or infinity.
-    #[error("{what} is not finite at iteration {iteration} (0 is the initial guess)")]
-    NotFinite {
-        /// The quantity.
-        what: &'static str,
-        /// The iteration.
-        iteration: usize,
-    },
+    #[error("{0} is not finite")]
+    NotFinite(&'static str),
     /// The allowed iterations are used up.
-    #[error("the residual is {residual:e} after the {allowed} allowed iterations; wanted is {target:e}")]
+    #[error("no convergence after the {allowed} allowed iterations; the residual wanted is {target:e}")]
     MaxIterations {
         /// Iterations allowed.
         allowed: usize,
-        /// ‖R‖ reached.
-        residual: f64,
         /// ‖R‖ wanted.
         target: f64,
     },
     /// Steps are accepted, but ‖R‖ hardly falls and is above round-off.
-    #[error(
-        "the residual stagnates at {residual:e} (iteration {iteration}); wanted is {target:e}, round-off ends at {round_off:e}"
-    )]
+    #[error("the residual stagnates; wanted is {target:e}, round-off ends at {round_off:e}")]
     Stagnated {
-        /// The iteration.
-        iteration: usize,
-        /// ‖R‖ reached.
-        residual: f64,
         /// ‖R‖ wanted.
         target: f64,
         /// ‖R‖ below which stagnation would count as convergence.
         round_off: f64,
     },
     /// ‖R‖ has grown beyond 1e8 times its first value, or the first magnitude if that is larger.
-    #[error("the residual grew to {residual:e} (iteration {iteration}), from {first:e} at the initial guess")]
+    #[error("the residual grew, from {first:e} at the initial guess")]
     Diverged {
-        /// The iteration.
-        iteration: usize,
-        /// ‖R‖ reached.
-        residual: f64,
         /// ‖R‖ of the initial guess.
         first: f64,
     },
     /// No step length is acceptable.
     #[error(
-        "no acceptable step at iteration {iteration}, residual {residual:e}: {trials} lengths down to {shortest:e}, \
-         {inadmissible} of them inadmissible, {not_finite} not finite"
+        "no acceptable step: {trials} lengths down to {shortest:e}, {inadmissible} of them inadmissible, {not_finite} not finite"
     )]
     LineSearchFailed {
-        /// The iteration.
-        iteration: usize,
-        /// ‖R‖ before the step.
-        residual: f64,
         /// Step lengths tried.
         trials: usize,
         /// The shortest step length.
@@ -101,16 +80,8 @@ pub enum NewtonFailure<E: std::error::Error + 'static> {
         last: Option<E>,
     },
     /// The linear system gave no useful step.
-    #[error("the linear system of iteration {iteration} gave no step, residual {residual:e}")]
-    LinearSolverFailed {
-        /// The iteration.
-        iteration: usize,
-        /// ‖R‖ before the step.
-        residual: f64,
-        /// The failure of the linear solver.
-        #[source]
-        source: LinearSolverFailure,
-    },
+    #[error("the linear system of the next iteration gave no step")]
+    LinearSolverFailed(#[from] LinearSolverFailure),
 }
 
 /// The failure of a linear solve to give a useful step.

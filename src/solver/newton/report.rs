@@ -1,6 +1,6 @@
 //! The report of Newton's method.
 
-use crate::solver::LinearReport;
+use crate::solver::{LinearOutcome, LinearReport};
 
 /// The merit function by which the line search accepted a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,8 +26,6 @@ pub struct NewtonIteration {
     pub forcing: f64,
     /// The linear solve that gave the step. Its outcome is negative curvature where conjugate gradients ended early and their step is used.
     pub krylov: LinearReport,
-    /// The conjugate gradients that were abandoned for GMRES because of negative curvature, if any.
-    pub negative_curvature: Option<LinearReport>,
 }
 
 /// Numbers of evaluations.
@@ -37,8 +35,6 @@ pub struct NewtonCounts {
     pub residuals: usize,
     /// Residuals at shortened steps.
     pub line_search: usize,
-    /// Potentials.
-    pub potentials: usize,
     /// Magnitudes and sensitivities.
     pub magnitudes: usize,
     /// Linearisations.
@@ -51,6 +47,15 @@ pub struct NewtonCounts {
     pub krylov_limited: usize,
     /// Linear systems left unsolved because their residual no longer fell.
     pub krylov_stagnated: usize,
+}
+
+impl NewtonCounts {
+    pub(super) fn add(&mut self, report: &LinearReport) {
+        self.tangent_products += report.products;
+        self.krylov_iterations += report.iterations;
+        self.krylov_limited += usize::from(report.outcome == LinearOutcome::IterationLimit);
+        self.krylov_stagnated += usize::from(report.outcome == LinearOutcome::Stagnated);
+    }
 }
 
 /// The course of the iteration, complete or not.

@@ -67,9 +67,6 @@ impl Display for Krylov {
 pub struct NewtonSettings {
     /// Wanted ‖R‖ over ‖R‖ at the initial guess, in [0, 1).
     pub relative_tolerance: f64,
-    /// The least ‖R‖ wanted, in units of eps times the magnitude of the contributions to R: dimensionless, finite and ≥ 0. A sum of a few
-    /// dozen contributions is exact to about 4.
-    pub floor: f64,
     /// Newton iterations allowed.
     pub max_iterations: usize,
     /// The forcing term: the accuracy to which each linear system is solved.
@@ -78,8 +75,6 @@ pub struct NewtonSettings {
     pub krylov: Krylov,
     /// Krylov iterations allowed for each linear system, at least 1.
     pub max_krylov_iterations: usize,
-    /// Halvings of the step allowed in a line search, at most 60.
-    pub max_halvings: u32,
 }
 
 /// The settings of a scene without the keys for Newton's method.
@@ -87,28 +82,23 @@ impl Default for NewtonSettings {
     fn default() -> Self {
         Self {
             relative_tolerance: 1e-9,
-            floor: 4.0,
             max_iterations: 30,
             forcing: Forcing::default(),
             krylov: Krylov::default(),
             max_krylov_iterations: 2000,
-            max_halvings: 25,
         }
     }
 }
 
 impl NewtonSettings {
+    /// The least ‖R‖ wanted, in units of eps times the magnitude of the contributions to R. A sum of a few dozen contributions is exact to
+    /// about this many eps.
+    pub const FLOOR: f64 = 4.0;
+
     pub(super) fn check(&self) -> Result<(), InvalidSetting> {
         InvalidSetting::check_tolerance("relative_tolerance", self.relative_tolerance)?;
-        let floor = self.floor;
-        InvalidSetting::check(floor >= 0.0 && floor.is_finite(), "floor", floor, "finite and at least 0")?;
         self.forcing.check()?;
-        if let Krylov::Gmres { restart } = self.krylov {
-            InvalidSetting::check_restart(restart as usize)?;
-        }
         let krylov = self.max_krylov_iterations;
-        InvalidSetting::check(krylov >= 1, "max_krylov_iterations", krylov as f64, "at least 1")?;
-        let halvings = self.max_halvings;
-        InvalidSetting::check(halvings <= 60, "max_halvings", f64::from(halvings), "at most 60")
+        InvalidSetting::check(krylov >= 1, "max_krylov_iterations", krylov as f64, "at least 1")
     }
 }

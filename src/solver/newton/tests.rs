@@ -237,13 +237,16 @@ fn negative_curvature_falls_back_to_gmres_and_says_so() {
     let mut x = [0.5, -0.5];
     let settings = NewtonSettings { krylov: Krylov::ConjugateGradient, ..NewtonSettings::default() };
     let report = newton(&problem, &mut x, &settings).unwrap();
-    let first = report.history.iterations[0];
-    assert!(first.krylov.converged());
-    assert_eq!(first.negative_curvature.map(|r| r.outcome), Some(LinearOutcome::NegativeCurvature));
+    assert!(report.history.iterations[0].krylov.converged());
+    // Products that belong to no reported solve are those of abandoned conjugate gradients.
+    let abandoned = |history: &NewtonHistory| {
+        history.counts.tangent_products - history.iterations.iter().map(|i| i.krylov.products).sum::<usize>()
+    };
+    assert!(abandoned(&report.history) > 0);
     // A definite tangent needs no fallback.
     let mut u = vec![0.0; 5];
     let report = newton(&springs(1.0, 1.0, 0.3, 5), &mut u, &settings).unwrap();
-    assert!(report.history.iterations.iter().all(|i| i.negative_curvature.is_none()));
+    assert_eq!(abandoned(&report.history), 0);
 }
 
 /// Π = Σ ¼ x⁴ − ½ x² + ½ i y²: hills with a valley on either side, and directions along which Π only rises.
@@ -280,7 +283,6 @@ fn negative_curvature_leads_downhill_where_there_is_a_potential() {
     let (x, history) = solve(&hills(n, true), Krylov::ConjugateGradient);
     assert!(x.iter().step_by(2).all(|x| (x - 1.0).abs() < 1e-6), "a valley of each: {x:?}");
     let truncated = |i: &&NewtonIteration| i.krylov.outcome == LinearOutcome::NegativeCurvature;
-    assert!(history.iterations.iter().filter(truncated).all(|i| i.negative_curvature.is_none()));
     assert!(history.iterations.iter().filter(truncated).count() > 0);
     // Without a potential, and by GMRES, the nearest solution of R = 0 is found: the top.
     for (problem, krylov) in
@@ -321,7 +323,7 @@ fn potential_accepts_what_the_residual_norm_refuses() {
 fn not_finite_is_never_accepted() {
     let problem = scalar(|_| Ok(f64::NAN), |_| 1.0);
     let error = failure(&problem, &mut [1.0], &NewtonSettings::default());
-    assert!(matches!(error.cause, NewtonFailure::NotFinite { iteration: 0, .. }));
+    assert!(matches!(error.cause, NewtonFailure::NotFinite(_)) && error.history.iterations.is_empty());
     // R is NaN beyond x = 1, where the full step leads. The step is shortened like an inadmissible one.
     for bad in [f64::NAN, f64::INFINITY] {
         let problem = scalar(|x| Ok(if x > 1.0 { bad } else { x * x * x - 0.5 }), |x| 3.0 * x * x);
@@ -332,11 +334,14 @@ fn not_finite_is_never_accepted() {
         let problem = scalar(|x| Ok(if x == 3.0 { 1.0 } else { bad }), |_| 1.0);
         let mut x = [3.0];
         let error = failure(&problem, &mut x, &NewtonSettings::default());
-        assert!(matches!(error.cause, NewtonFailure::NotFinite { iteration: 1, .. }), "{error:?}");
+        assert!(
+            matches!(error.cause, NewtonFailure::NotFinite(_)) && error.history.first_residual == Some(1.0),
+            "{error:?}"
+        );
         assert_eq!(x, [3.0]);
         // NaN in the tangent.
         let error = failure(&scalar(Ok, |_| bad), &mut x, &NewtonSettings::default());
-        assert!(matches!(error.cause, NewtonFailure::LinearSolverFailed { source: LinearSolverFailure::Error(_), .. }));
+        assert!(matches!(error.cause, NewtonFailure::LinearSolverFailed(LinearSolverFailure::Error(_))));
         // NaN in the magnitude, with which any residual would count as converged.
         let problem = Problem {
             residual: |x: &[f64]| Ok(x.to_vec()),
@@ -345,7 +350,7 @@ fn not_finite_is_never_accepted() {
             tangent: |_: &[f64]| Dense(vec![vec![1.0]]),
         };
         let error = failure(&problem, &mut [1.0], &NewtonSettings::default());
-        assert!(matches!(error.cause, NewtonFailure::NotFinite { iteration: 0, .. }));
+        assert!(matches!(error.cause, NewtonFailure::NotFinite(_)) && error.history.iterations.is_empty());
     }
 }
 
@@ -363,7 +368,10 @@ fn failures_are_told_apart() {
 
     // A zero tangent.
     let error = failure(&scalar(|x| Ok(x - 1.0), |_| 0.0), &mut [0.0], &default);
-    assert!(matches!(error.cause, NewtonFailure::LinearSolverFailed { iteration: 1, .. }), "{error:?}");
+    assert!(
+        matches!(error.cause, NewtonFailure::LinearSolverFailed(_)) && error.history.iterations.is_empty(),
+        "{error:?}"
+    );
     // A tangent of the wrong sign: the residual rises at every step length.
     let mut x = [0.0];
     let error = failure(&scalar(|x| Ok(x - 1.0), |_| -1.0), &mut x, &default);
@@ -371,7 +379,7 @@ fn failures_are_told_apart() {
     assert_eq!(x, [0.0]);
     // A tangent a thousand times too stiff: every step is accepted, but the residual hardly falls.
     let error = failure(&scalar(|x| Ok(x - 1.0), |_| 1000.0), &mut [0.0], &default);
-    assert!(matches!(error.cause, NewtonFailure::Stagnated { iteration: 8, .. }), "{error:?}");
+    assert!(matches!(error.cause, NewtonFailure::Stagnated { .. }) && error.history.iterations.len() == 8, "{error:?}");
     // Π = −½x² falls without end. The tangent is not its second derivative.
     let downhill = Problem {
         residual: |x: &[f64]| Ok(vec![-x[0]]),
@@ -380,7 +388,8 @@ fn failures_are_told_apart() {
         tangent: |_: &[f64]| Dense(vec![vec![1.0]]),
     };
     let error = failure(&downhill, &mut [1.0], &default);
-    assert!(matches!(error.cause, NewtonFailure::Diverged { residual, .. } if residual > 1e8), "{error:?}");
+    let residual = error.history.residual().unwrap();
+    assert!(matches!(error.cause, NewtonFailure::Diverged { .. }) && residual > 1e8, "{error:?}");
     let settings = NewtonSettings { forcing: Forcing::Fixed(0.0), ..default };
     let error = failure(&downhill, &mut [1.0], &settings);
     assert!(matches!(error.cause, NewtonFailure::Setting(InvalidSetting { name: "forcing", .. })));
@@ -423,7 +432,10 @@ fn round_off_is_convergence_and_other_stagnation_is_not() {
     assert_eq!(report.convergence, Convergence::RoundOff);
     assert!(report.history.counts.line_search == 0, "no halving where nothing can be gained");
     let error = failure(&noisy(100.0 * eps), &mut [0.0], &settings);
-    assert!(matches!(error.cause, NewtonFailure::LineSearchFailed { iteration: 2, .. }), "{error:?}");
+    assert!(
+        matches!(error.cause, NewtonFailure::LineSearchFailed { .. }) && error.history.iterations.len() == 1,
+        "{error:?}"
+    );
     assert_eq!(error.history.counts.magnitudes, 2);
 }
 

@@ -47,10 +47,14 @@ impl<const D: usize> Preconditioner for BlockJacobi<D> {
 impl<const D: usize> LinearOperator for BlockJacobi<D> {
     fn apply(&self, r: &[f64], z: &mut [f64]) {
         z.copy_from_slice(r);
-        for (z, inverse) in z.chunks_exact_mut(D).zip(self.inverses()) {
-            let product = inverse * Vector::<f64, D>::from_column_slice(z);
-            z.copy_from_slice(product.as_slice());
-        }
+        multiply_blocks(self.inverses(), r, z);
+    }
+}
+
+/// z = M r for a matrix M of diagonal blocks.
+pub(super) fn multiply_blocks<const D: usize>(blocks: &[Tensor<f64, D>], r: &[f64], z: &mut [f64]) {
+    for ((block, r), z) in blocks.iter().zip(r.chunks_exact(D)).zip(z.chunks_exact_mut(D)) {
+        z.copy_from_slice((block * Vector::<f64, D>::from_column_slice(r)).as_slice());
     }
 }
 

@@ -48,14 +48,9 @@ const PAR: Par = Par::Seq;
 /// ```
 #[derive(Debug, Default)]
 pub struct Direct<const D: usize> {
-    made: Option<Made<D>>,
-}
-
-#[derive(Debug)]
-enum Made<const D: usize> {
-    Factors(Box<Factors>),
+    factors: Option<Factors>,
     /// Block-Jacobi, for a tangent that is not positive definite or has no known sparsity pattern.
-    Blocks(BlockJacobi<D>),
+    blocks: BlockJacobi<D>,
 }
 
 /// L of K = L Lᵀ, with rows and columns in a fill-reducing order.
@@ -65,54 +60,46 @@ struct Factors {
     values: Vec<f64>,
 }
 
-/// The lower half of a symmetric matrix, column after column.
-#[derive(Default)]
-struct Lower {
-    starts: Vec<usize>,
-    rows: Vec<usize>,
-    values: Vec<f64>,
-}
-
-impl Lower {
-    fn of<const D: usize>(tangent: &dyn LinearOperator, neighbours: &Neighbours) -> Self {
-        let Neighbours { nodes, fixed, .. } = neighbours;
-        let sharing = sharing::<D>(neighbours);
-        let size = D * nodes.len();
-        let (mut columns, mut x, mut y) = (vec![Vec::new(); size], vec![0.0; size], vec![0.0; size]);
-        for colour in colours(&sharing) {
-            for k in 0..D {
-                x.fill(0.0);
-                colour.iter().filter(|&node| !fixed[node * D + k]).for_each(|node| x[node * D + k] = 1.0);
-                tangent.apply(&x, &mut y);
-                for (column, around) in colour.iter().map(|node| (node * D + k, &sharing[*node])) {
-                    let rows = around.iter().flat_map(|node| node * D..(node + 1) * D).filter(|&row| row >= column);
-                    // A zero on the diagonal belongs to a fixed value, which gets the identity's row.
-                    let value = |row: usize| if row == column && y[row] == 0.0 { 1.0 } else { y[row] };
-                    columns[column].extend(rows.map(|row| (row, value(row))).filter(|&(_, value)| value != 0.0));
-                }
+/// The lower half of the tangent: the rows and values of each column.
+fn lower<const D: usize>(tangent: &dyn LinearOperator, neighbours: &Neighbours) -> Vec<Vec<(usize, f64)>> {
+    let Neighbours { nodes, fixed, .. } = neighbours;
+    let sharing = sharing::<D>(neighbours);
+    let size = D * nodes.len();
+    let (mut columns, mut x, mut y) = (vec![Vec::new(); size], vec![0.0; size], vec![0.0; size]);
+    for colour in colours(&sharing) {
+        for k in 0..D {
+            x.fill(0.0);
+            colour.iter().filter(|&node| !fixed[node * D + k]).for_each(|node| x[node * D + k] = 1.0);
+            tangent.apply(&x, &mut y);
+            for (column, around) in colour.iter().map(|node| (node * D + k, &sharing[*node])) {
+                let rows = around.iter().flat_map(|node| node * D..(node + 1) * D).filter(|&row| row >= column);
+                // A zero on the diagonal belongs to a fixed value, which gets the identity's row.
+                let value = |row: usize| if row == column && y[row] == 0.0 { 1.0 } else { y[row] };
+                columns[column].extend(rows.map(|row| (row, value(row))).filter(|&(_, value)| value != 0.0));
             }
         }
-        let mut lower = Self { starts: vec![0], ..Self::default() };
-        for column in columns {
-            lower.rows.extend(column.iter().map(|&(row, _)| row));
-            lower.values.extend(column.iter().map(|&(_, value)| value));
-            lower.starts.push(lower.rows.len());
-        }
-        lower
     }
+    columns
+}
 
-    /// The Cholesky factor; `None` if the matrix is not positive definite.
-    fn factors(&self) -> Option<Box<Factors>> {
-        let size = self.starts.len() - 1;
-        let pattern = SymbolicSparseColMatRef::new_checked(size, size, &self.starts, None, &self.rows);
+impl Factors {
+    /// The Cholesky factor of the matrix with this lower half; `None` if the matrix is not positive definite.
+    fn new(columns: &[Vec<(usize, f64)>]) -> Option<Self> {
+        let (rows, entries): (Vec<usize>, Vec<f64>) = columns.iter().flatten().copied().unzip();
+        let mut starts = vec![0];
+        starts.extend(columns.iter().scan(0, |end, column| {
+            *end += column.len();
+            Some(*end)
+        }));
+        let pattern = SymbolicSparseColMatRef::new_checked(columns.len(), columns.len(), &starts, None, &rows);
         let order = SymmetricOrdering::Amd;
         let symbolic = factorize_symbolic_cholesky(pattern, Side::Lower, order, Default::default()).ok()?;
         let scratch = symbolic.factorize_numeric_llt_scratch::<f64>(PAR, Default::default());
         let (mut values, mut memory) = (vec![0.0; symbolic.len_val()], MemBuffer::try_new(scratch).ok()?);
-        let (matrix, memory) = (SparseColMatRef::new(pattern, &self.values), MemStack::new(&mut memory));
+        let (matrix, memory) = (SparseColMatRef::new(pattern, &entries), MemStack::new(&mut memory));
         let (shift, settings) = (Default::default(), Default::default());
         symbolic.factorize_numeric_llt(&mut values, matrix, Side::Lower, shift, PAR, memory, settings).ok()?;
-        Some(Box::new(Factors { symbolic, values }))
+        Some(Self { symbolic, values })
     }
 }
 
@@ -127,8 +114,7 @@ fn sharing<const D: usize>(neighbours: &Neighbours) -> Vec<Vec<usize>> {
         of_outer.iter().for_each(|&leader| sharing[leader].extend(&direct[outer]));
     }
     for around in &mut sharing {
-        let followed: Vec<usize> =
-            around.iter().flat_map(|&node| leaders.get(node).into_iter().flatten().copied()).collect();
+        let followed: Vec<usize> = around.iter().filter_map(|&node| leaders.get(node)).flatten().copied().collect();
         around.extend(followed);
         around.sort_unstable();
         around.dedup();
@@ -138,11 +124,11 @@ fn sharing<const D: usize>(neighbours: &Neighbours) -> Vec<Vec<usize>> {
 
 /// The nodes of each colour. Two nodes of one colour share no row.
 fn colours(sharing: &[Vec<usize>]) -> Vec<Vec<usize>> {
-    let (mut colours, mut of_row): (Vec<Vec<usize>>, Vec<HashSet<usize>>) =
-        (Vec::new(), vec![HashSet::new(); sharing.len()]);
+    let mut colours: Vec<Vec<usize>> = Vec::new();
+    let mut of_row = vec![HashSet::new(); sharing.len()];
     for (node, rows) in sharing.iter().enumerate() {
-        let taken: HashSet<usize> = rows.iter().flat_map(|&row| of_row[row].iter().copied()).collect();
-        let colour = (0..).find(|colour| !taken.contains(colour)).unwrap_or(colours.len());
+        let free = |colour: &usize| rows.iter().all(|&row| !of_row[row].contains(colour));
+        let colour = (0..colours.len()).find(free).unwrap_or(colours.len());
         if colour == colours.len() {
             colours.push(Vec::new());
         }
@@ -152,13 +138,11 @@ fn colours(sharing: &[Vec<usize>]) -> Vec<Vec<usize>> {
     colours
 }
 
-/// The nodes within reach of a place, ascending.
+/// The nodes within reach of a place.
 fn around<const D: usize>(at: [u32; 3], reach: u32, numbers: &HashMap<[u32; 3], usize>) -> Vec<usize> {
     let range = |k: usize| if k < D { at[k].saturating_sub(reach)..=at[k] + reach } else { at[k]..=at[k] };
     let all = range(2).flat_map(|z| range(1).flat_map(move |y| range(0).map(move |x| [x, y, z])));
-    let mut found: Vec<usize> = all.filter_map(|at| numbers.get(&at).copied()).collect();
-    found.sort_unstable();
-    found
+    all.filter_map(|at| numbers.get(&at).copied()).collect()
 }
 
 impl LinearOperator for Factors {
@@ -174,29 +158,22 @@ impl LinearOperator for Factors {
 impl<const D: usize> Direct<D> {
     /// Bytes of the factor; `None` if there is none.
     pub fn bytes(&self) -> Option<usize> {
-        match &self.made {
-            Some(Made::Factors(factors)) => Some(size_of_val(factors.values.as_slice())),
-            _ => None,
-        }
+        self.factors.as_ref().map(|factors| size_of_val(factors.values.as_slice()))
     }
 }
 
 impl<const D: usize> Preconditioner for Direct<D> {
     fn prepare<'a>(&'a mut self, tangent: &'a dyn Linearization) -> Box<dyn LinearOperator + 'a> {
-        let made = self.made.get_or_insert_with(|| {
-            let factors = tangent.neighbours().and_then(|neighbours| Lower::of::<D>(tangent, &neighbours).factors());
-            factors.map_or_else(
-                || {
-                    let mut blocks = BlockJacobi::default();
-                    blocks.take(tangent);
-                    Made::Blocks(blocks)
-                },
-                Made::Factors,
-            )
-        });
-        match made {
-            Made::Factors(factors) => Box::new(&**factors),
-            Made::Blocks(blocks) => Box::new(&*blocks),
+        if self.factors.is_none() && self.blocks.len() == 0 {
+            let columns = tangent.neighbours().map(|neighbours| lower::<D>(tangent, &neighbours));
+            self.factors = columns.and_then(|columns| Factors::new(&columns));
+            if self.factors.is_none() {
+                self.blocks.take(tangent);
+            }
+        }
+        match &self.factors {
+            Some(factors) => Box::new(factors),
+            None => Box::new(&self.blocks),
         }
     }
 }

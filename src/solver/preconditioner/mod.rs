@@ -55,7 +55,8 @@ pub struct Neighbours {
 /// // Blocks of one row are the whole matrix, so M⁻¹A = I takes one iteration, however different the entries are.
 /// let (matrix, mut inverse, mut x) = (Diagonal(vec![1.0, 1e3, 1e6]), BlockJacobi::<1>::default(), [0.0; 3]);
 /// let inverse = inverse.prepare(&matrix);
-/// let report = gmres(&matrix, &*inverse, &[1.0, 2e3, 3e6], &mut x, &GmresSettings::default(), &Pool::default())?;
+/// let settings = GmresSettings { relative_tolerance: 1e-8, max_iterations: 10, restart: 30 };
+/// let report = gmres(&matrix, &*inverse, &[1.0, 2e3, 3e6], &mut x, &settings, &Pool::default())?;
 /// assert_eq!(report.iterations, 1);
 /// assert!(x.iter().zip([1.0, 2.0, 3.0]).all(|(x, exact)| (x - exact).abs() < 1e-15 * exact));
 /// # Ok::<(), bfree::solver::LinearError>(())

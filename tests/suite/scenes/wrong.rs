@@ -128,7 +128,8 @@ fn wrong_text_is_refused_at_its_place() {
         let ((from, to), path) = (case[0].split_once(" => ").unwrap(), case[1]);
         let text = mutated(from, to);
         let error = scene::read(&text, &[]).expect_err(to);
-        let SceneError::Malformed(malformed) = &error else { panic!("{to}: {error}") };
+        let SceneError::Malformed(problems) = &error else { panic!("{to}: {error}") };
+        let malformed = &problems.list[0];
         assert!(path.is_empty() || malformed.path == path, "{to}: {path} expected, not {}", malformed.path);
         for word in &case[2..] {
             assert!(malformed.message.contains(word), "{to}: no {word:?} in\n{error}");

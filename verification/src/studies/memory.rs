@@ -93,7 +93,7 @@ fn dimension<const D: usize>(name: &str, law: &Material, report: &mut Report) ->
         let (mut internal, mut f_0) = (rest.clone(), identity::<f64, D>());
         if regime.flowed {
             f_0 = end(&regime_of_flow(), &mut random);
-            internal = law.updated_variables(&MaterialState::new(f_0 - identity()).in_step(1.0, &rest));
+            law.update_variables(&MaterialState::new(f_0 - identity()).in_step(1.0, &rest), &mut internal);
         }
         let mut worst = [0.0; QUANTITIES.len()];
         let mut flowed = 0;
@@ -179,7 +179,8 @@ fn errors<const D: usize>(
         asymmetry = (one - two).abs() / (elasticity.norm() * other.norm());
     }
 
-    let next = law.updated_variables(at);
+    let mut next = at.internal.to_vec();
+    law.update_variables(at, &mut next);
     let after = at.in_step(0.0, &next);
     let kept = (law.stress(&after) - stress).norm() / (stress.norm() + 1e-3 * stiffness);
     let lost = |at: &MaterialState<f64, D>| internal_variable(law, at, DISSIPATED).unwrap_or(0.0);

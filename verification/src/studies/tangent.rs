@@ -120,7 +120,7 @@ fn dimension<const D: usize, L: Law + Clone>(
                 let mut ways = vec![(shape.to_owned(), Prepared::new(&simulation)?)];
                 if ways[0].1.supports.is_tiled() {
                     let (plain, _) = Supports::plain(&approximation, &simulation.grid, &simulation.particles.position)?;
-                    ways.push((format!("{shape}, plain"), Prepared { supports: plain, ..ways[0].1.clone() }));
+                    ways.push((format!("{shape}, plain"), Prepared { supports: plain, ..Prepared::new(&simulation)? }));
                 }
                 for (way, prepared) in &ways {
                     let equilibrium = prepared.equilibrium(&simulation);

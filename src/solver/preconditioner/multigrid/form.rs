@@ -38,7 +38,7 @@ impl LocalForm {
         self.centres.push([0.0; 3]);
         self.filled.push(0.0);
         self.masses.push(0.0);
-        self.tangents.extend(std::iter::repeat_n(0.0, tiles));
+        self.tangents.resize(tiles * self.cells.len(), 0.0);
     }
 
     /// Divides the weighted sums in `centres` by the sums of their weights, `filled`.
@@ -46,6 +46,11 @@ impl LocalForm {
         for (centre, &filled) in self.centres.iter_mut().zip(&self.filled) {
             centre.iter_mut().for_each(|x| *x /= filled);
         }
+    }
+
+    /// Whether a value is no unknown, node after node.
+    pub(super) fn fixed(&self) -> Vec<bool> {
+        self.prescribed.iter().zip(&self.follows).map(|(held, follows)| *held || *follows).collect()
     }
 
     /// Sums the cells into those of the next coarser grid. Returns for each cell the coarse cell in which it lies.

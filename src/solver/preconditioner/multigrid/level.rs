@@ -4,7 +4,8 @@ use super::chebyshev::largest;
 use super::form::LocalForm;
 use crate::aggregation::{Extension, Followers, Occupied, Pieces};
 use crate::solver::LinearOperator;
-use crate::tensor::{Tensor, Vector, inverse};
+use crate::solver::preconditioner::block_jacobi::multiply_blocks;
+use crate::tensor::{Tensor, Vector, identity, inverse};
 use nalgebra::DMatrix;
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -41,7 +42,7 @@ impl<const D: usize> LinearOperator for Level<D> {
         if !self.followers.is_empty() {
             self.followers.extend::<f64>(bytemuck::cast_slice_mut(extended.to_mut()));
         }
-        self.multiply(&extended, y);
+        self.multiply(bytemuck::cast_slice(&extended), bytemuck::cast_slice_mut(y));
         self.followers.restrict::<f64>(bytemuck::cast_slice_mut(y));
         y.iter_mut().zip(&self.held).filter(|(_, held)| **held).for_each(|(y, _)| *y = 0.0);
     }
@@ -49,35 +50,24 @@ impl<const D: usize> LinearOperator for Level<D> {
 
 impl<const D: usize> Level<D> {
     /// K x
-    fn multiply(&self, x: &[f64], y: &mut [f64]) {
-        for ((entries, neighbours), y) in self.entries.iter().zip(&self.neighbours).zip(y.chunks_exact_mut(D)) {
-            let mut sum = Vector::<f64, D>::zeros();
-            for (entry, &node) in entries.iter().zip(neighbours) {
-                if node != NONE {
-                    let u = Vector::<f64, D>::from_fn(|i, _| x[node as usize * D + i]);
-                    sum += entry * u;
-                }
-            }
-            y.copy_from_slice(sum.as_slice());
+    fn multiply(&self, x: &[Vector<f64, D>], y: &mut [Vector<f64, D>]) {
+        for ((entries, neighbours), y) in self.entries.iter().zip(&self.neighbours).zip(y) {
+            let existing = entries.iter().zip(neighbours).filter(|(_, node)| **node != NONE);
+            *y = existing.fold(Vector::zeros(), |sum, (entry, &node)| sum + entry * x[node as usize]);
         }
     }
 }
 
-/// The nodes of the grid of twice the spacing from which the node `index` is interpolated, with weights.
-fn between<const D: usize>(index: [u32; 3]) -> Vec<([u32; 3], f64)> {
-    let mut all = vec![([0; 3], 1.0)];
-    for k in 0..D {
-        let (half, odd) = (index[k] / 2, index[k] % 2 == 1);
-        let upper = all.clone().into_iter().filter(|_| odd).map(|(mut node, weight)| {
-            node[k] = half + 1;
-            (node, 0.5 * weight)
-        });
-        let upper: Vec<_> = upper.collect();
-        all.iter_mut()
-            .for_each(|(node, weight)| (node[k], *weight) = (half, if odd { 0.5 * *weight } else { *weight }));
-        all.extend(upper);
-    }
-    all
+/// The nodes of the grid of twice the spacing from which the node `index` is interpolated, with weights. Where an index is odd, the node lies
+/// halfway between two coarse nodes.
+fn between<const D: usize>(index: [u32; 3]) -> impl Iterator<Item = ([u32; 3], f64)> {
+    let upper = |corner: u32, k: usize| corner >> k & 1;
+    let odd = (0..D).filter(|&k| index[k] % 2 == 1).count();
+    let corners = (0..1 << D).filter(move |&corner| (0..D).all(|k| upper(corner, k) <= index[k] % 2));
+    corners.map(move |corner| {
+        let node = std::array::from_fn(|k| if k < D { index[k] / 2 + upper(corner, k) } else { 0 });
+        (node, 0.5_f64.powi(odd as i32))
+    })
 }
 
 /// The place of the node `to` in the stencil of the node `from`.
@@ -93,7 +83,7 @@ impl<const D: usize> Level<D> {
         let mut numbers: HashMap<[u32; 3], u32> = HashMap::new();
         let mut above = Vec::with_capacity(form.nodes.len());
         for &index in &form.nodes {
-            let list = between::<D>(index).into_iter().map(|(coarse, weight)| {
+            let list = between::<D>(index).map(|(coarse, weight)| {
                 let number = *numbers.entry(coarse).or_insert_with(|| {
                     next.nodes.push(coarse);
                     next.nodes.len() as u32 - 1
@@ -112,7 +102,7 @@ impl<const D: usize> Level<D> {
             held: Self::held(form, &above, next.nodes.len()),
             neighbours: neighbours.collect(),
             entries: vec![[Tensor::zeros(); 27]; next.nodes.len()],
-            fixed_above: form.prescribed.iter().zip(&form.follows).map(|(held, follows)| *held || *follows).collect(),
+            fixed_above: form.fixed(),
             above,
             ..Self::default()
         };
@@ -124,8 +114,8 @@ impl<const D: usize> Level<D> {
         level.follow(form, &mut next);
         level.hold_empty(&next);
         level.hold();
-        level.invert_blocks(&next);
         next.prescribed.clone_from(&level.held);
+        level.invert_blocks(&next);
         level.largest = largest(&level, &|r, z| level.precondition(r, z), D * next.nodes.len());
         (level, next)
     }
@@ -152,8 +142,8 @@ impl<const D: usize> Level<D> {
     /// Adds the nodal terms Pᵀ B P. The next form gets their row sums.
     fn add_nodes(&mut self, form: &LocalForm, next: &mut LocalForm) {
         let mut lumped = vec![Tensor::<f64, D>::zeros(); next.nodes.len()];
-        for (fine, list) in self.above.iter().enumerate() {
-            let own = Tensor::<f64, D>::from_column_slice(&form.blocks[fine * D * D..(fine + 1) * D * D]);
+        let blocks: &[Tensor<f64, D>] = bytemuck::cast_slice(&form.blocks);
+        for (list, own) in self.above.iter().zip(blocks) {
             for &(a, of_a) in list {
                 lumped[a as usize] += own * of_a;
                 for &(b, of_b) in list {
@@ -162,7 +152,7 @@ impl<const D: usize> Level<D> {
                 }
             }
         }
-        next.blocks = lumped.iter().flat_map(|block| block.iter().copied()).collect();
+        next.blocks = bytemuck::cast_slice(&lumped).to_vec();
     }
 
     /// Adds a cell of the finer grid, as one quadrature point in the coarse cell `at`.
@@ -257,17 +247,14 @@ impl<const D: usize> Level<D> {
                 }
             }
         }
-        for (k, fixed) in self.held.iter().zip(&next.follows).map(|(held, follows)| *held || *follows).enumerate() {
+        for (k, _) in next.fixed().iter().enumerate().filter(|(_, fixed)| **fixed) {
             let (block, i) = (&mut blocks[k / D], k % D);
-            if fixed {
-                block.row_mut(i).fill(0.0);
-                block.column_mut(i).fill(0.0);
-                block[(i, i)] = 1.0;
-            }
+            block.row_mut(i).fill(0.0);
+            block.column_mut(i).fill(0.0);
+            block[(i, i)] = 1.0;
         }
-        let usable =
-            |inverse: Tensor<f64, D>| if inverse.iter().all(|x| x.is_finite()) { inverse } else { Tensor::identity() };
-        self.inverse = blocks.iter().map(|block| usable(inverse(block))).collect();
+        let finite = |inverse: &Tensor<f64, D>| inverse.iter().all(|x| x.is_finite());
+        self.inverse = blocks.iter().map(|block| Some(inverse(block)).filter(finite).unwrap_or(identity())).collect();
     }
 
     /// The block of K for two nodes; zero where they are not neighbours.
@@ -299,22 +286,24 @@ impl<const D: usize> Level<D> {
 
     /// z = D⁻¹ r
     pub fn precondition(&self, r: &[f64], z: &mut [f64]) {
-        for ((inverse, r), z) in self.inverse.iter().zip(r.chunks_exact(D)).zip(z.chunks_exact_mut(D)) {
-            let product = inverse * Vector::<f64, D>::from_column_slice(r);
-            z.copy_from_slice(product.as_slice());
+        multiply_blocks(&self.inverse, r, z);
+    }
+
+    /// Calls `visit` with the entries of P: a value of the finer level that is an unknown, a value of this level, and the weight.
+    fn each_weight(&self, mut visit: impl FnMut(usize, usize, f64)) {
+        for (fine, list) in self.above.iter().enumerate() {
+            for &(coarse, weight) in list {
+                for i in (0..D).filter(|i| !self.fixed_above[fine * D + i]) {
+                    visit(fine * D + i, coarse as usize * D + i, weight);
+                }
+            }
         }
     }
 
     /// Eᵀ Pᵀ r
     pub fn up(&self, r: &[f64]) -> Vec<f64> {
         let mut out = vec![0.0; D * self.neighbours.len()];
-        for (fine, list) in self.above.iter().enumerate() {
-            for &(coarse, weight) in list {
-                for i in (0..D).filter(|i| !self.fixed_above[fine * D + i]) {
-                    out[coarse as usize * D + i] += weight * r[fine * D + i];
-                }
-            }
-        }
+        self.each_weight(|fine, coarse, weight| out[coarse] += weight * r[fine]);
         self.followers.restrict::<f64>(bytemuck::cast_slice_mut(&mut out));
         out.iter_mut().zip(&self.held).filter(|(_, held)| **held).for_each(|(out, _)| *out = 0.0);
         out
@@ -323,12 +312,6 @@ impl<const D: usize> Level<D> {
     /// x += P E y
     pub fn down(&self, mut y: Vec<f64>, x: &mut [f64]) {
         self.followers.extend::<f64>(bytemuck::cast_slice_mut(&mut y));
-        for (fine, list) in self.above.iter().enumerate() {
-            for &(coarse, weight) in list {
-                for i in (0..D).filter(|i| !self.fixed_above[fine * D + i]) {
-                    x[fine * D + i] += weight * y[coarse as usize * D + i];
-                }
-            }
-        }
+        self.each_weight(|fine, coarse, weight| x[fine] += weight * y[coarse]);
     }
 }

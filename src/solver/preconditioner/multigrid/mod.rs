@@ -15,8 +15,9 @@ mod level;
 pub use form::LocalForm;
 
 use super::{BlockJacobi, Preconditioner};
+use crate::solver::vector::xpby;
 use crate::solver::{LinearOperator, Linearization};
-use chebyshev::{chebyshev, largest};
+use chebyshev::{largest, smooth};
 use filter::Filter;
 use level::Level;
 use nalgebra::{DVector, Dyn, LU};
@@ -50,9 +51,9 @@ pub(crate) fn bytes(nodes: usize, dimension: usize) -> usize {
 impl<const D: usize> Multigrid<D> {
     /// Makes the levels of a tangent.
     fn build(&mut self, form: Option<LocalForm>, fine: &dyn LinearOperator) {
-        self.filter =
-            form.as_ref().filter(|form| form.degree == 3).map(|form| Filter::new::<D>(form, self.blocks.inverses()));
-        self.largest = largest(fine, &|r, z| self.smooth(r, z), self.blocks.len());
+        let cubic = form.as_ref().filter(|form| form.degree == 3);
+        self.filter = cubic.map(|form| Filter::new::<D>(form, self.blocks.inverses()));
+        self.largest = largest(fine, &|r, z| self.filtered(r, z), self.blocks.len());
         let Some(mut form) = form else { return };
         loop {
             let (level, next) = Level::<D>::of(&form);
@@ -70,7 +71,7 @@ impl<const D: usize> Multigrid<D> {
     }
 
     /// z = M r, with the M of the finest smoother.
-    fn smooth(&self, r: &[f64], z: &mut [f64]) {
+    fn filtered(&self, r: &[f64], z: &mut [f64]) {
         self.blocks.apply(r, z);
         if let Some(filter) = &self.filter {
             filter.add::<D>(r, z);
@@ -89,9 +90,9 @@ impl<const D: usize> Multigrid<D> {
             return x;
         }
         let jacobi = |r: &[f64], z: &mut [f64]| level.precondition(r, z);
-        chebyshev(level, &jacobi, level.largest, b, &mut x, true);
+        smooth(level, &jacobi, level.largest, b, &mut x, true);
         self.correct(from + 1, level, b, &mut x);
-        chebyshev(level, &jacobi, level.largest, b, &mut x, false);
+        smooth(level, &jacobi, level.largest, b, &mut x, false);
         x
     }
 
@@ -100,7 +101,7 @@ impl<const D: usize> Multigrid<D> {
         let Some(level) = self.levels.get(to) else { return };
         let mut r = vec![0.0; b.len()];
         operator.apply(x, &mut r);
-        r.iter_mut().zip(b).for_each(|(r, b)| *r = b - *r);
+        xpby(b, -1.0, &mut r);
         level.down(self.coarse(to, &level.up(&r)), x);
     }
 }
@@ -114,13 +115,13 @@ struct Cycle<'a, const D: usize> {
 impl<const D: usize> LinearOperator for Cycle<'_, D> {
     fn apply(&self, r: &[f64], z: &mut [f64]) {
         let Self { levels, tangent } = *self;
-        let jacobi = |r: &[f64], z: &mut [f64]| levels.smooth(r, z);
+        let jacobi = |r: &[f64], z: &mut [f64]| levels.filtered(r, z);
         z.fill(0.0);
-        chebyshev(tangent, &jacobi, levels.largest, r, z, true);
-        mutant!("multigrid: no coarse levels": { return chebyshev(tangent, &jacobi, levels.largest, r, z, false); });
+        smooth(tangent, &jacobi, levels.largest, r, z, true);
+        mutant!("multigrid: no coarse levels": { return smooth(tangent, &jacobi, levels.largest, r, z, false); });
         levels.correct(0, tangent, r, z);
         mutant!("multigrid: no smoothing after the coarse levels": { return; });
-        chebyshev(tangent, &jacobi, levels.largest, r, z, false);
+        smooth(tangent, &jacobi, levels.largest, r, z, false);
     }
 }
 

@@ -137,9 +137,9 @@ fn naive<T: Real, const D: usize>(law: &Material, h: &Tensor<T, D>) -> (T, Tenso
             let lambda = lit(lame.lambda);
             (lame, lambda * lit(0.5) * ln_j * ln_j, lambda * ln_j)
         }
-        Material::MooneyRivlin(MooneyRivlin { c1, c2, volumetric }) => {
+        Material::MooneyRivlin(solid @ MooneyRivlin { c1, c2, .. }) => {
             // I₁ and I₂ of the 3×3 C, whose other diagonal entries are 1.
-            let (c1, c2, lambda) = (lit(*c1), lit(*c2), lit(*volumetric));
+            let (c1, c2, lambda) = (lit(*c1), lit(*c2), lit(solid.volumetric_lambda()));
             let missing = lit((3 - D) as f64);
             let first = trace(&c) + missing;
             let second = (first * first - contract(&c, &c) - missing) * lit(0.5);
