@@ -44,7 +44,7 @@ impl Evidence {
     /// The evidence of differences.
     pub fn of(measured: &Measured) -> Self {
         let mut columns: Vec<Column> = measured.columns.iter().map(Column::of).collect();
-        let values = columns.iter().flat_map(|column| &column.accepted).flat_map(|estimate| &estimate.value);
+        let values = measured.columns.iter().flat_map(|column| column.best().value);
         let scale = values.filter(|value| value.is_finite()).fold(0.0_f64, |greatest, value| greatest.max(value.abs()));
         for Column { accepted, sides, kink, .. } in &mut columns {
             for error in accepted.iter_mut().chain(&mut *sides).flat_map(|estimate| &mut estimate.error) {

@@ -4,10 +4,11 @@ use crate::cases::{self, Case, case};
 use crate::laws::{Law, Voce};
 use crate::tensor::{PAIRS, Random, combine, norm};
 use crate::{check, states};
-use tangent_check::difference::Ladder;
+use tangent_check::difference::{Derivative, Estimate, Ladder};
 use tangent_check::finding::{Finding, Reason, Verdict};
 use tangent_check::judge::{
-    Directions, Loading, Product, check_columns, check_columns_on, check_directions, judge_exact,
+    Directions, Loading, Measured, Product, check_columns, check_columns_on, check_directions, judge, judge_exact,
+    measure,
 };
 use tangent_check::law::CallFailed;
 use tangent_check::matrix::Matrix;
@@ -86,6 +87,47 @@ fn single_precision_is_noise_and_no_error() {
         case.claimed[(0, 0)] *= 1.1;
         assert_eq!(check(&case).verdict, Verdict::Wrong);
     }
+}
+
+/// The number of entries above 1 % of ‖C‖ that, spoiled by ±`size` alone, are not seen.
+fn unseen(case: &Case, measured: &Measured, size: f64) -> usize {
+    let large = (0..case.claimed.entries.len())
+        .filter(|m| case.claimed.entries[*m].abs() > 0.01 * case.claimed.greatest() * (1.0 + 1e-9));
+    let spoiled = large.flat_map(|m| [(m, size), (m, -size)]);
+    let missed = spoiled.filter(|(m, size)| {
+        let mut claimed = case.claimed.clone();
+        claimed.entries[*m] *= 1.0 + size;
+        judge(case.law, &claimed, measured).verdict == Verdict::Consistent
+    });
+    missed.count()
+}
+
+#[test]
+fn the_control_is_the_smallest_error_that_every_entry_shows() {
+    for (law, number) in cases::LAWS.into_iter().flat_map(|law| (0..10).map(move |number| (law, number))) {
+        let case = case(law, number);
+        let mut f = |k: usize, h: f64| Ok((case.respond)(k, h));
+        let measured = measure(&case.claimed, &case.value, Ladder::default(), &mut f).expect("the law answers");
+        let control = judge(law, &case.claimed, &measured).control.expect("the tangent is consistent");
+        assert_eq!(unseen(&case, &measured, control), 0, "{law}, state {number}: {control:e}");
+        assert!(control <= 1e-12 || unseen(&case, &measured, 0.1 * control) > 0, "{law}, state {number}: {control:e}");
+    }
+}
+
+#[test]
+fn a_missed_control_is_not_checked() {
+    // The second entry is 1.05 % of the first, and its deviation of half the allowed one hides the planted error.
+    let estimate = Estimate { value: vec![1.0, 0.0105], error: vec![0.99e-6; 2] };
+    let column = Derivative {
+        central: estimate.clone(),
+        forward: estimate.clone(),
+        backward: estimate,
+        contradicted: false,
+        calls: 0,
+    };
+    let measured = Measured { value: vec![1.0; 2], noise: vec![0.0; 2], columns: vec![column], jump: None, calls: 0 };
+    let claimed = Matrix { rows: 2, columns: 1, entries: vec![1.0, 0.0105 + 5e-6] };
+    assert_eq!(judge("missed", &claimed, &measured).reason, Some(Reason::ControlMissed(1e-3)));
 }
 
 /// |x| with the claimed slope.
