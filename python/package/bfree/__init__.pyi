@@ -371,6 +371,7 @@ def check_tangent(
     u: ArrayLike,
     *,
     terms: Mapping[str, tuple[Callable[[NDArray[np.float64]], Any], Any]] | None = None,
+    start: ArrayLike | None = None,
     scale: ArrayLike | None = None,
     seed: int = 1,
     name: str | None = None,
@@ -384,6 +385,9 @@ def check_tangent(
     whole lacks one of them, or has it with a wrong sign or factor, the report says so.
 
     Up to 30 unknowns each column is measured, otherwise three random directions. Then halving finds a wrong entry.
+
+    `start` is u at the start of the step, by default 0. A deviation below 1e-5 is inexact in place of wrong if the residual jumps on the way from
+    there to u: the trace of a local iteration with a loose tolerance.
 
     `scale` is a change of u over which the residual changes its nature, a number or an array like u: unknowns of different units need an
     array. The default is the greatest |u|, or 1. Rows of different units should be checked apart.

@@ -83,15 +83,19 @@ def check_law_library(
     )
 
 
-def check_tangent(residual, jacobian, u, *, terms=None, scale=None, seed=1, name=None):
+def check_tangent(residual, jacobian, u, *, terms=None, start=None, scale=None, seed=1, name=None):
     u = _numbers("u", u).copy()
     if not u.size:
         raise ValueError("u is empty")
     scale = _scale(scale, u)
+    start = np.zeros_like(u) if start is None else _numbers("start", start)
+    if start.shape != u.shape:
+        raise ValueError(f"start has the shape {start.shape}; it must have the shape {u.shape} of u")
+    place = (u, start, scale, seed)
     with np.errstate(all="ignore"):
-        whole = _Checked("the whole", residual, jacobian, u, scale, seed)
+        whole = _Checked("the whole", residual, jacobian, place)
         parts = {
-            term: _Checked(f"term {term}", *pair, u, scale, seed, whole.shape) for term, pair in (terms or {}).items()
+            term: _Checked(f"term {term}", *pair, place, whole.shape) for term, pair in (terms or {}).items()
         }
         every = [whole, *parts.values()]
         diagnoses, notes = _explain(whole, parts)
@@ -249,7 +253,8 @@ class _LawOfStep:
 class _Checked:
     """A residual with its tangent, and the check of them."""
 
-    def __init__(self, name, residual, jacobian, u, scale, seed, shape=None):
+    def __init__(self, name, residual, jacobian, place, shape=None):
+        u, start, scale, seed = place
         self.name, self.u = name, u
         value = _numbers("the residual", residual(u.copy()))
         self.shape, self.value = value.shape, value.ravel()
@@ -258,6 +263,7 @@ class _Checked:
         self.matrix, self.product = self._tangent(jacobian)
         self.finding, self.directions, self.exception = _bfree.check_residual(
             name,
+            start.ravel().tolist(),
             u.ravel().tolist(),
             self.value.tolist(),
             scale.tolist(),

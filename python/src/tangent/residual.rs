@@ -8,18 +8,23 @@ use pyo3::prelude::*;
 use std::cell::RefCell;
 use tangent_check::difference::Ladder;
 use tangent_check::finding::Finding as Checked;
-use tangent_check::judge::{Directions, check_columns, check_directions};
+use tangent_check::judge::{Directions, Loading, check_columns_on, check_directions};
 use tangent_check::matrix::Matrix;
 use tangent_check::states::Random;
 
 /// The greatest number of unknowns whose columns are all measured.
 const COLUMNS: usize = 30;
 
+/// Up to so many columns have the finer ladder, as [`check_columns`](tangent_check::judge::check_columns) has it.
+const FEW: usize = 6;
+
 /// The random directions for more unknowns.
 const DIRECTIONS: usize = 3;
 
 /// A residual around u, in scaled unknowns: u + s ∘ w.
 struct Residual<'a, 'py> {
+    /// The unknowns at the start of the step.
+    start: &'a [f64],
     u: &'a [f64],
     scale: &'a [f64],
     residual: &'a Bound<'py, PyAny>,
@@ -45,6 +50,18 @@ impl Residual<'_, '_> {
         call(self.product, self.scale.iter().zip(w).map(|(s, w)| s * w).collect())
     }
 
+    /// R at a part of the way from the start of the step to u.
+    fn on_the_way(&self, part: f64) -> PyResult<Vec<f64>> {
+        let at = self.start.iter().zip(self.u).map(|(start, u)| start + part * (u - start)).collect();
+        call(self.residual, at)
+    }
+
+    /// The greatest scaled component of the step.
+    fn size(&self) -> f64 {
+        let changes = self.u.iter().zip(self.start).zip(self.scale).map(|((u, start), s)| (u - start).abs() / s);
+        changes.fold(0.0, f64::max)
+    }
+
     /// All columns of the tangent.
     fn columns(&self, name: &str, value: &[f64], raised: &mut Raised) -> PyResult<Checked> {
         let size = self.u.len();
@@ -55,8 +72,12 @@ impl Residual<'_, '_> {
                 claimed[(i, k)] = entry;
             }
         }
-        let mut f = |k: usize, h: f64| raised.during(self.residual.py(), || self.value(&units[k], h));
-        let mut finding = check_columns(name, &claimed, value, &mut f);
+        let raised = RefCell::new(raised);
+        let mut f = |k: usize, h: f64| raised.borrow_mut().during(self.residual.py(), || self.value(&units[k], h));
+        let mut respond = |part: f64| raised.borrow_mut().during(self.residual.py(), || self.on_the_way(part));
+        let ladder = if size > FEW { Ladder::coarse() } else { Ladder::default() };
+        let loading = Loading { size: self.size(), respond: &mut respond };
+        let mut finding = check_columns_on(name, &claimed, value, ladder, &mut f, Some(loading));
         for matrix in [&mut finding.claimed, &mut finding.measured, &mut finding.errors] {
             for (place, entry) in matrix.entries.iter_mut().enumerate() {
                 *entry /= self.scale[place % size];
@@ -72,7 +93,9 @@ impl Residual<'_, '_> {
         let raised = RefCell::new(raised);
         let mut product = |w: &[f64]| raised.borrow_mut().during(py, || self.product(w));
         let mut f = |w: &[f64], h: f64| raised.borrow_mut().during(py, || self.value(w, h));
-        let directions = Directions { count: DIRECTIONS, seed, ladder: Ladder::default(), loading: None };
+        let mut respond = |part: f64| raised.borrow_mut().during(py, || self.on_the_way(part));
+        let loading = Some(Loading { size: self.size(), respond: &mut respond });
+        let directions = Directions { count: DIRECTIONS, seed, ladder: Ladder::default(), loading };
         let mut finding = check_directions(name, self.u.len(), value, &mut product, &mut f, directions);
         // An entry that is not located belongs to a direction, not to an unknown.
         finding.worst = finding
@@ -108,8 +131,10 @@ type Answer = (Finding, Vec<Vec<f64>>, Option<Py<PyAny>>);
 
 /// Checks a tangent at u. `residual` and `product` take and give flat arrays.
 #[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "called by the package alone")]
 pub fn check_residual(
     name: &str,
+    start: Vec<f64>,
     u: Vec<f64>,
     value: Vec<f64>,
     scale: Vec<f64>,
@@ -118,7 +143,7 @@ pub fn check_residual(
     seed: u64,
 ) -> PyResult<Answer> {
     let py = residual.py();
-    let around = Residual { u: &u, scale: &scale, residual, product };
+    let around = Residual { start: &start, u: &u, scale: &scale, residual, product };
     let mut raised = Raised::default();
     let finding = if u.len() <= COLUMNS {
         around.columns(name, &value, &mut raised)?
