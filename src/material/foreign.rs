@@ -308,18 +308,19 @@ impl Law for Foreign {
         &self.calls.variables
     }
 
-    fn updated_variables<const D: usize>(&self, at: &MaterialState<f64, D>) -> Vec<f64> {
+    fn update_variables<const D: usize>(&self, at: &MaterialState<f64, D>, variables: &mut [f64]) {
         let (calls, internal, f) = (&*self.calls, self.internal(at), gradient(at));
         let layout = Layout::of(&calls.signature);
         let work = self.energy(at);
         let next = calls.respond(&f, at.dt, &internal, |step, response| {
-            let mut next = [&response.state[..], &response.stress[..]].concat();
-            next.extend(strains().vector(&tangent_check::tensor::sum(&step.strain, 1.0, &step.strain_increment)));
+            let strain = tangent_check::tensor::sum(&step.strain, 1.0, &step.strain_increment);
+            let mut next = [&response.state[..], &response.stress[..], &strains().vector(&strain)].concat();
             next.extend(f.as_flattened());
             next.extend([internal[layout.time()] + at.dt, internal[layout.steps()] + 1.0, work]);
             Ok(next)
         });
-        next.unwrap_or_else(|| vec![f64::NAN; internal.len()])
+        let next = next.unwrap_or_else(|| vec![f64::NAN; variables.len()]);
+        variables.iter_mut().zip(next).for_each(|(variable, next)| *variable = next);
     }
 
     fn is_symmetric(&self) -> bool {

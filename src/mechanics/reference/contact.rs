@@ -94,13 +94,14 @@ pub(crate) fn touch<const D: usize>(particles: &Particles<D>, grid: &Grid<D>, su
         return true;
     }
     // The variance of the body index, weighted with N.
-    let mut sums = vec![Vector::<f64, 3>::zeros(); supports.active().len()];
-    supports.spread(&mut sums, |p| {
-        let body = f64::from(particles.body[p]);
-        Vector::from([1.0, body, body * body])
-    });
-    let is_shared = |sum: &Vector<f64, 3>| sum[0] * sum[2] - sum[1] * sum[1] > ALONE * sum[0] * sum[2];
-    sums.iter().any(is_shared)
+    let sum = |power: i32| {
+        let mut sum: Vec<Vector<f64, 1>> = vec![Vector::zeros(); supports.active().len()];
+        supports.spread(&mut sum, |p| Vector::from([f64::from(particles.body[p]).powi(power)]));
+        sum
+    };
+    let [weights, means, squares] = [0, 1, 2].map(sum);
+    let mut of_nodes = weights.iter().zip(&means).zip(&squares).map(|((w, m), s)| (w[0], m[0], s[0]));
+    of_nodes.any(|(weight, mean, square)| weight * square - mean * mean > ALONE * weight * square)
 }
 
 /// The pairs of a cell's id and an item in that cell, sorted, each pair once.

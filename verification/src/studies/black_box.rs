@@ -67,10 +67,12 @@ impl law::Law for BlackBox {
         let from = Convention::piola_in_rows();
         let cauchy = cauchy_stress(&from, &stress, &step.gradient).map_err(failed)?;
         let place = Configuration { gradient_before: step.gradient_before, gradient: step.gradient, stress: cauchy };
+        let mut state = step.state.clone();
+        self.law.update_variables(&at, &mut state);
         Ok(Response {
+            state,
             stress: stress_vector(&self.convention, &cauchy, &step.gradient).map_err(failed)?,
             tangent: convert(&tangent, &from, &self.convention, &place).map_err(failed)?,
-            state: self.law.updated_variables(&at),
         })
     }
 }
