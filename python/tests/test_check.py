@@ -310,8 +310,16 @@ def loose_root(u):
 
 def test_an_inexact_tangent_fails_only_if_asked():
     u = np.array([1.4])
-    report = bfree.check_tangent(loose_root, np.diag(1 / (3 * loose_root(u) ** 2 + 1)), u)
+    tangent = np.diag(1 / (3 * loose_root(u) ** 2 + 1))
+    report = bfree.check_tangent(loose_root, tangent, u)
     assert report.verdict == "inexact", report
+    # The same with many unknowns, along random directions.
+    many = np.full(40, 1.4)
+    assert bfree.check_tangent(loose_root, np.kron(np.eye(40), tangent), many).verdict == "inexact"
+    # A step on whose way the residual does not jump explains nothing.
+    assert bfree.check_tangent(loose_root, tangent, u, start=u - 1e-9).verdict == "wrong"
+    with pytest.raises(ValueError, match="start has the shape"):
+        bfree.check_tangent(loose_root, tangent, u, start=0)
     assert report.ok and report.exit_code() == 0 and report.exit_code(strict=True) == 1
     report.assert_consistent()
     with pytest.raises(AssertionError, match="An inexact tangent counts as"):
