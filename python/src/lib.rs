@@ -1,4 +1,5 @@
-//! bfree from Python: scenes, simulations, what a step solves, and laws by their energy. `bfree.pyi` is its manual for Python.
+//! bfree from Python: scenes, simulations, what a step solves, laws by their energy, and the check of tangents.
+//! `package/bfree/__init__.pyi` is its manual for Python.
 
 mod arrays;
 mod energy;
@@ -8,6 +9,7 @@ mod scene;
 mod simulation;
 mod step;
 mod system;
+mod tangent;
 
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
@@ -40,9 +42,9 @@ fn step_error(error: &(impl Error + 'static)) -> PyErr {
     StepError::new_err(chain(error))
 }
 
-/// The module.
-#[pymodule]
-mod bfree {
+/// The module in the package `bfree`.
+#[pymodule(name = "_bfree")]
+mod module {
     #[pymodule_export]
     use super::energy::{Number, det};
     #[pymodule_export]
@@ -55,6 +57,19 @@ mod bfree {
     use super::step::Step;
     #[pymodule_export]
     use super::system::Tangent;
+    #[pymodule_export]
+    use super::tangent::convention::Convention;
+    #[pymodule_export]
+    use super::tangent::law::{LawStep, check_python_law};
+    #[cfg(unix)]
+    #[pymodule_export]
+    use super::tangent::library::{check_law_in_library, serve_law};
+    #[pymodule_export]
+    use super::tangent::newton::{NewtonOrder, newton_order, newton_rows};
+    #[pymodule_export]
+    use super::tangent::report::{Diagnosis, Entry, Finding, Report};
+    #[pymodule_export]
+    use super::tangent::residual::check_residual;
     #[pymodule_export]
     use super::{SceneError, StepError};
     use pyo3::prelude::*;

@@ -32,8 +32,14 @@ fn json(value: &Bound<'_, PyAny>) -> PyResult<String> {
 #[pymethods]
 impl Scene {
     #[new]
-    #[pyo3(signature = (source, *, set = None, folder = None))]
-    fn new(source: &Bound<'_, PyAny>, set: Option<&Bound<'_, PyDict>>, folder: Option<PathBuf>) -> PyResult<Self> {
+    #[pyo3(signature = (source, *, set = None, folder = None, allow_libraries = Vec::new()))]
+    fn new(
+        source: &Bound<'_, PyAny>,
+        set: Option<&Bound<'_, PyDict>>,
+        folder: Option<PathBuf>,
+        allow_libraries: Vec<PathBuf>,
+    ) -> PyResult<Self> {
+        allow_libraries.iter().for_each(|path| bfree::material::allow_library(path));
         let mut overrides = Vec::new();
         for (key, value) in set.into_iter().flatten() {
             let text = format!("{}={}", key.extract::<String>()?, json(&value)?);

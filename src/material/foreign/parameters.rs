@@ -160,7 +160,8 @@ pub(crate) trait Outside {
         let (named, path) = (self.description(), format!("{path}.library"));
         let shown = named.library.display();
         let Some(library) = allowed(&named.library) else {
-            let wanted = "must be allowed, because a scene is data and loads no code: add --allow-library PATH to the command line";
+            let wanted = "must be allowed, because a scene is data and loads no code: add --allow-library PATH to the command line, in \
+                          Python Scene(…, allow_libraries=[PATH])";
             problems.refuse(&path, format_args!("{shown}"), wanted);
             return None;
         };

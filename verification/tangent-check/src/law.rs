@@ -78,4 +78,12 @@ pub trait Law {
     /// # Errors
     /// The call failed.
     fn respond(&mut self, step: &Step) -> Result<Response, CallFailed>;
+
+    /// The stress of the response to a step. A law whose tangent costs a call of its own leaves it out here: differences need no tangent.
+    ///
+    /// # Errors
+    /// The call failed.
+    fn stress(&mut self, step: &Step) -> Result<Vec<f64>, CallFailed> {
+        Ok(self.respond(step)?.stress)
+    }
 }

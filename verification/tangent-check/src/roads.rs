@@ -140,11 +140,11 @@ fn changed(step: &Step, input: Input, plane: bool) -> Step {
 /// The law does not answer the step as it is.
 pub fn inputs_read(law: &mut dyn Law, step: &Step) -> Result<Vec<Input>, CallFailed> {
     let plane = law.convention().plane();
-    let stress = law.respond(step)?.stress;
+    let stress = law.stress(step)?;
     let mut read = Vec::new();
     for input in Input::ALL {
-        let answer = law.respond(&changed(step, input, plane));
-        if answer.is_ok_and(|response| response.stress == stress) {
+        let answer = law.stress(&changed(step, input, plane));
+        if answer.is_ok_and(|changed| changed == stress) {
             continue;
         }
         read.push(input);
@@ -260,7 +260,7 @@ impl<'a> Perturbed<'a> {
     pub fn value(&mut self, column: usize, h: f64) -> Result<Vec<f64>, CallFailed> {
         let strain = unit_strain(&self.convention, column);
         let step = self.perturbed(&strain, h)?;
-        let stress = self.law.respond(&step)?.stress;
+        let stress = self.law.stress(&step)?;
         self.rated(&strain, h, &step, stress)
     }
 

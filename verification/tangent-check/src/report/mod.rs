@@ -12,7 +12,7 @@ mod severity;
 mod terminal;
 mod words;
 
-use crate::finding::{Finding, Report};
+use crate::finding::{Finding, Reason, Report, Verdict};
 use std::fmt;
 
 /// A format of a report.
@@ -81,6 +81,20 @@ impl fmt::Display for UnknownFormat {
 }
 
 impl std::error::Error for UnknownFormat {}
+
+/// The name: "not checked".
+impl fmt::Display for Verdict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(words::verdict(*self))
+    }
+}
+
+/// A sentence: "No perturbation changed the response."
+impl fmt::Display for Reason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&words::cause(Some(self)))
+    }
+}
 
 impl Report {
     /// A report over findings, without names of components, notes and diagnoses.

@@ -1,0 +1,48 @@
+"""Implicit finite-strain material point method, and a check of tangents for any law and any code. `__init__.pyi` is the manual."""
+
+from ._bfree import (
+    Diagnosis,
+    Entry,
+    Finding,
+    Law,
+    LawStep,
+    NewtonOrder,
+    Number,
+    Particles,
+    Report,
+    Scene,
+    SceneError,
+    Simulation,
+    Step,
+    StepError,
+    Tangent,
+    __version__,
+    det,
+    newton_order,
+)
+from .tangents import check_law, check_law_library, check_tangent, newton_table
+
+__all__ = [
+    "Diagnosis",
+    "Entry",
+    "Finding",
+    "Law",
+    "LawStep",
+    "NewtonOrder",
+    "Number",
+    "Particles",
+    "Report",
+    "Scene",
+    "SceneError",
+    "Simulation",
+    "Step",
+    "StepError",
+    "Tangent",
+    "__version__",
+    "check_law",
+    "check_law_library",
+    "check_tangent",
+    "det",
+    "newton_order",
+    "newton_table",
+]

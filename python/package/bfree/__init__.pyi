@@ -1,0 +1,624 @@
+"""Implicit finite-strain material point method: scenes, simulations, what a step solves, laws by their energy, and a check of tangents.
+
+Arrays are read-only and belong to the moment at which they were asked for: later steps do not change them.
+"""
+
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any, Literal, final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.sparse.linalg import LinearOperator
+
+__version__: str
+
+class SceneError(ValueError):
+    """A scene that cannot be used: which key, its value, what is allowed; a line for each cause."""
+
+class StepError(RuntimeError):
+    """A step that failed, with its causes; the simulation is as after the last good one."""
+
+@final
+class Scene:
+    """A scene that has been read and checked."""
+
+    def __init__(
+        self,
+        source: str | os.PathLike[str] | Mapping[str, Any],
+        *,
+        set: Mapping[str, Any] | None = None,
+        folder: str | os.PathLike[str] | None = None,
+        allow_libraries: Sequence[str | os.PathLike[str]] = (),
+    ) -> None:
+        """Reads a file, or takes a dict of the same keys.
+
+        `set` replaces values by their paths, as `{"time.step": 0.01, "bodies.0.density": 3}`. Files that the scene names are looked for in
+        `folder`: by default the one of the scene's file, or the current one. A scene loads shared libraries with material laws only if
+        `allow_libraries` has their paths; the permission lasts as long as the interpreter.
+
+        Raises SceneError.
+        """
+
+    @property
+    def dimension(self) -> int:
+        """1, 2 or 3."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """All of its keys, with the values of those that were left out."""
+
+    def build(self, *, laws: Mapping[str, Law] | None = None) -> Simulation:
+        """The simulation at its start; `laws` takes the place of the materials of the bodies of these names.
+
+        What bfree chooses by itself it chooses by the scene's material: give one of about the same stiffness.
+
+        Raises SceneError.
+        """
+
+@final
+class Simulation(Iterator[Step]):
+    """A simulation. `for step in simulation` takes steps until the scene's `time.end`; the interpreter's lock is free while one is taken."""
+
+    @property
+    def bodies(self) -> list[str]:
+        """Names of the bodies, in the order of `particles.body`."""
+
+    @property
+    def plan(self) -> str:
+        """What a step requires, as `bfree check` prints it."""
+
+    @property
+    def dimension(self) -> int:
+        """D"""
+
+    @property
+    def time(self) -> float:
+        """t"""
+
+    @property
+    def dt(self) -> float:
+        """The length of the coming step."""
+
+    @property
+    def end(self) -> float:
+        """When the last step ends: `time.end`; between whole steps it is shortened."""
+
+    @property
+    def particles(self) -> Particles:
+        """The particles."""
+
+    @property
+    def kinetic_energy(self) -> float: ...
+    @property
+    def strain_energy(self) -> float: ...
+    @property
+    def external_work(self) -> float:
+        """Work of loads and moving walls since the start."""
+
+    @property
+    def dissipated(self) -> float:
+        """Energy that damping has taken since the start."""
+
+    @property
+    def momentum(self) -> NDArray[np.float64]:
+        """Σ m v"""
+
+    def advance(self) -> Step:
+        """Takes a step, also beyond `end`; it is halved while it fails.
+
+        Raises StepError, and leaves the state as it was.
+        """
+
+    def __iter__(self) -> Simulation: ...
+    def __next__(self) -> Step: ...
+    @property
+    def nodes(self) -> NDArray[np.float64]:
+        """Positions of the n active nodes of the coming step, (n, D)."""
+
+    @property
+    def free(self) -> NDArray[np.bool_]:
+        """Which of their components are solved for, (n, D): those that are neither prescribed nor follow other nodes."""
+
+    @property
+    def prescribed(self) -> NDArray[np.float64]:
+        """Δφ of those that are not, 0 elsewhere, (n, D)."""
+
+    def residual(self, dphi: ArrayLike) -> NDArray[np.float64]:
+        """R(Δφ) of the coming step, (n, D); at prescribed components the reaction.
+
+        Δφ is the motion of the nodes, (n, D) or as many numbers, from t up to where forces are in balance: the end of the step, but for
+        generalised-α.
+
+        Raises StepError where det F ≤ 0 at a particle.
+        """
+
+    def tangent(self, dphi: ArrayLike | None = None) -> LinearOperator:
+        """K = ∂R/∂Δφ at Δφ, 0 by default, on the free components: rows and columns of the others are zero. Of order n·D.
+
+        A product freezes the tangent anew; `K @ U` of several columns does so once.
+        """
+
+    @property
+    def K(self) -> LinearOperator:
+        """The tangent at Δφ = 0."""
+
+    def to_pyvista(self, fields: Sequence[str] = ("displacement", "von_mises", "body")) -> Any:
+        """The particles as pyvista.PolyData with these fields of `Particles`; needs the package pyvista."""
+
+@final
+class Particles:
+    """The n particles, in the order of their making. What is asked for is that of the present state."""
+
+    def __len__(self) -> int: ...
+    @property
+    def position(self) -> NDArray[np.float64]:
+        """x, (n, D)"""
+
+    @property
+    def displacement(self) -> NDArray[np.float64]:
+        """From the position at the start, (n, D)."""
+
+    @property
+    def velocity(self) -> NDArray[np.float64]:
+        """v, (n, D); with inertia only."""
+
+    @property
+    def acceleration(self) -> NDArray[np.float64]:
+        """a, (n, D); with inertia only."""
+
+    @property
+    def deformation_gradient(self) -> NDArray[np.float64]:
+        """F, (n, 3, 3)"""
+
+    @property
+    def jacobian(self) -> NDArray[np.float64]:
+        """det F, (n,)"""
+
+    @property
+    def strain(self) -> NDArray[np.float64]:
+        """E = (FᵀF − I)/2, (n, 3, 3)"""
+
+    @property
+    def stress(self) -> NDArray[np.float64]:
+        """Cauchy's, with the out-of-plane normal stress, (n, 3, 3)."""
+
+    @property
+    def principal_stress(self) -> NDArray[np.float64]:
+        """Of Cauchy's stress, the largest first, (n, 3)."""
+
+    @property
+    def pressure(self) -> NDArray[np.float64]:
+        """Positive in compression, (n,)."""
+
+    @property
+    def von_mises(self) -> NDArray[np.float64]:
+        """(n,)"""
+
+    @property
+    def energy_density(self) -> NDArray[np.float64]:
+        """W, per reference volume, (n,)."""
+
+    @property
+    def plastic_strain(self) -> NDArray[np.float64]:
+        """(n,), accumulated plastic strain; 0 of laws that have none."""
+
+    @property
+    def dissipated_density(self) -> NDArray[np.float64]:
+        """(n,), energy per reference volume that flow and relaxation have taken; 0 of elastic laws."""
+
+    @property
+    def mass(self) -> NDArray[np.float64]:
+        """(n,)"""
+
+    @property
+    def volume(self) -> NDArray[np.float64]:
+        """Of reference, (n,)."""
+
+    @property
+    def body(self) -> NDArray[np.int64]:
+        """Number of the body, (n,)."""
+
+@final
+class Step:
+    """What a step did."""
+
+    @property
+    def time(self) -> float:
+        """t at its end."""
+
+    @property
+    def dt(self) -> float:
+        """Its length."""
+
+    @property
+    def iterations(self) -> int:
+        """Newton's."""
+
+    @property
+    def krylov_iterations(self) -> int:
+        """Of all linear systems."""
+
+    @property
+    def residuals(self) -> list[float]:
+        """‖R‖ at the start of Newton's method and after each iteration."""
+
+    @property
+    def active_nodes(self) -> int: ...
+    @property
+    def error(self) -> float | None:
+        """Its local error in units of the grid spacing, where the scene gives a tolerance."""
+
+    @property
+    def failed(self) -> list[str]:
+        """Why earlier attempts failed, each repeated with half of its length."""
+
+    @property
+    def seconds(self) -> float: ...
+    @property
+    def reactions(self) -> dict[str, NDArray[np.float64]]:
+        """The force of each prescribed condition on the bodies, (D,)."""
+
+@final
+class Law:
+    """An elastic law by its energy W per reference volume, a function of the 3×3 Green–Lagrange strain E."""
+
+    def __init__(self, energy: Callable[[NDArray[Any]], Any], *, check: bool = True) -> None:
+        """Calls `energy` once, with an array whose entries record what is done to them, and differentiates what was recorded twice.
+
+        Arithmetic, powers, NumPy's sqrt, exp, log, sin, cos, tan, sinh, cosh, tanh, arctan and this module's `det` can be recorded;
+        branches and comparisons cannot. `check` compares the derivatives in 1, 2 and 3 dimensions, from strains of 1e-8 to J = 0.05 and 20,
+        asks for no energy and stress at rest, and for independence of rotations.
+
+        Raises ValueError or TypeError.
+        """
+
+    def check(self) -> str:
+        """The table of the checks."""
+
+    @property
+    def operations(self) -> int:
+        """How many operations an evaluation takes."""
+
+@final
+class Number:
+    """An entry of a strain that is recorded."""
+
+@final
+class Tangent:
+    """What the operators of `Simulation.tangent` apply."""
+
+def det(a: Any) -> Any:
+    """The determinant of a 3×3 array, recorded strains too."""
+
+def check_law(
+    stress: Callable[..., Any],
+    tangent: Callable[[NDArray[np.float64]], Any] | None = None,
+    *,
+    convention: str = "piola",
+    order: str | None = None,
+    dimension: int = 3,
+    state: ArrayLike = (),
+    states: Mapping[str, ArrayLike] | Sequence[ArrayLike] | None = None,
+    dt: float = 0.1,
+    seed: int = 1,
+    name: str | None = None,
+) -> Report:
+    """Checks that the tangent of a law is the derivative of its stress, in states that are made here or given. There is no tolerance to choose.
+
+    A law that depends on the deformation alone is two functions of F, an array (3, 3): `check_law(lambda F: P(F), lambda F: A(F))`.
+    Any other law is one function of a `LawStep`, which returns (stress, tangent), or (stress, tangent, state) if it has internal variables.
+    `state` are their values at rest.
+
+    | convention | stress | tangent | order |
+    |---|---|---|---|
+    | "piola" | P | ∂P/∂F | 11, 12, 13, 21, … |
+    | "second_piola" | S | ∂S/∂E, E = (FᵀF − I)/2 | voigt |
+    | "abaqus" | σ | DDSDDE: Jaumann rate of J σ, over J | abaqus |
+    | "jaumann_cauchy" | σ | Jaumann rate of σ | abaqus |
+    | "truesdell" | σ | Truesdell rate of σ: the spatial tangent | voigt |
+    | "green_naghdi" | σ | Green–Naghdi rate of J σ, over J | abaqus |
+    | "cauchy_strain" | σ | ∂σ/∂Δε, with the rotation of the step frozen | voigt |
+    | "cauchy_gradient" | σ | ∂σ/∂F | voigt, 11, 12, 13, 21, … |
+    | "kirchhoff_gradient" | J σ | ∂(J σ)/∂F | voigt, 11, 12, 13, 21, … |
+
+    Stresses are tensors (3, 3) or vectors, tangents are tensors (3, 3, 3, 3) or matrices. Axes of length 1 at their end are left out.
+    `order` is that of the vector of a symmetric tensor: "voigt" 11, 22, 33, 23, 13, 12; "abaqus" 11, 22, 33, 12, 13, 23;
+    "explicit" 11, 22, 33, 12, 23, 13; "mfront" as abaqus with shears times √2. Shear strains are 2 ε in voigt and abaqus, ε in explicit.
+    With `dimension=2` all tensors are (2, 2), and components with index 3 are left out.
+
+    `states` are deformation gradients F, or rows of them for a path of several steps, each with a name or not. Each step takes the time
+    `dt`. Without them, twelve paths are made from `seed`: small to large strains, J from 0.5 to 2, rotations, unloading, reloading; and paths
+    around the yield surface of a law whose internal variables show one.
+
+    An exception in one state is a finding with its text. If all states fail, the first exception is raised.
+
+    Raises ValueError or TypeError for a convention or a shape that does not exist.
+    """
+
+def check_law_library(
+    library: str | os.PathLike[str],
+    *,
+    umat: bool = False,
+    mfront: str | None = None,
+    c: str | None = None,
+    properties: ArrayLike = (),
+    state: int | Mapping[str, float] | Sequence[str] = 0,
+    tangent: str = "jaumann_kirchhoff",
+    temperature: float = 0.0,
+    name: str = "BFREE",
+    external: Mapping[str, float] | None = None,
+    plane_strain: bool = False,
+    states: Mapping[str, ArrayLike] | Sequence[ArrayLike] | None = None,
+    dt: float = 0.1,
+    seed: int = 1,
+    limit: float = 5.0,
+) -> Report:
+    """`check_law` of a law in a shared library: a UMAT, an MFront behaviour `mfront`, or a law `c` with the header bfree_law.h.
+
+    The library runs in a child process: a crash, an endless loop or a STOP is a finding, after `limit` seconds at the latest. This call runs
+    the library's code.
+
+    `state` is the number of internal variables of a UMAT, or their names, or names with values at rest. `tangent` is the meaning of a UMAT's
+    DDSDDE: "jaumann_kirchhoff" (Abaqus at finite strain), "jaumann_cauchy" or "strain". `temperature` and `name` are its TEMP and CMNAME.
+    `external` are external state variables of a behaviour of MFront.
+
+    Raises ValueError if the law cannot be called. Linux and macOS only.
+    """
+
+def check_tangent(
+    residual: Callable[[NDArray[np.float64]], Any],
+    jacobian: Any,
+    u: ArrayLike,
+    *,
+    terms: Mapping[str, tuple[Callable[[NDArray[np.float64]], Any], Any]] | None = None,
+    start: ArrayLike | None = None,
+    scale: ArrayLike | None = None,
+    seed: int = 1,
+    name: str | None = None,
+) -> Report:
+    """Checks that a tangent is the derivative of a residual at u. There is no tolerance to choose.
+
+    u and the residual are arrays of any shape. `jacobian` is the tangent at u: an array, a SciPy sparse matrix, a LinearOperator, or anything
+    else with `shape` and `@`; or a function `jacobian(u)` that returns one; or a function `jvp(u, w)` that returns the product with w.
+
+    `terms` are parts of the residual with their tangents, each checked by itself: {"inertia": (residual, jacobian), …}. If the tangent of the
+    whole lacks one of them, or has it with a wrong sign or factor, the report says so.
+
+    Up to 30 unknowns each column is measured, otherwise three random directions. Then halving finds a wrong entry.
+
+    `start` is u at the start of the step, by default 0. A deviation below 1e-5 is inexact in place of wrong if the residual jumps on the way from
+    there to u: the trace of a local iteration with a loose tolerance.
+
+    `scale` is a change of u over which the residual changes its nature, a number or an array like u: unknowns of different units need an
+    array. The default is the greatest |u|, or 1. Rows of different units should be checked apart.
+
+    Raises what residual and jacobian raise at u, and ValueError for shapes that do not fit.
+    """
+
+def newton_order(norms: ArrayLike, *, round_off: float | None = None) -> NewtonOrder:
+    """The order of convergence from the residual norms of a solution: ‖R‖ at the initial guess and after each iteration.
+
+    Norms up to `round_off` are round-off; by default 1e-14 of the greatest norm.
+    """
+
+def newton_table(
+    solutions: Mapping[str, ArrayLike] | Sequence[ArrayLike],
+    form: Literal["text", "markdown", "latex", "csv"] = "text",
+    *,
+    round_off: float | None = None,
+) -> str:
+    """A table of residual norms with their order of convergence, a row for each solution. LaTeX needs the package booktabs."""
+
+@final
+class LawStep:
+    """The inputs of a law in a step. Tensors are arrays (3, 3), or (2, 2) in two dimensions."""
+
+    @property
+    def F(self) -> NDArray[np.float64]:
+        """Deformation gradient at the end of the step."""
+
+    @property
+    def F_before(self) -> NDArray[np.float64]:
+        """Deformation gradient at the start of the step."""
+
+    @property
+    def strain(self) -> NDArray[np.float64]:
+        """Accumulated strain at the start of the step, turned by `rotation`."""
+
+    @property
+    def strain_increment(self) -> NDArray[np.float64]:
+        """Δε = ln ΔV of F F_before⁻¹ = ΔV ΔR."""
+
+    @property
+    def rotation(self) -> NDArray[np.float64]:
+        """ΔR"""
+
+    @property
+    def stress(self) -> NDArray[np.float64]:
+        """The stress at the start of the step as the law returned it, not turned."""
+
+    @property
+    def state(self) -> NDArray[np.float64]:
+        """Internal variables at the start of the step, (n,)."""
+
+    @property
+    def time(self) -> float:
+        """Time at the start of the step."""
+
+    @property
+    def dt(self) -> float:
+        """The length of the step."""
+
+    @property
+    def number(self) -> int:
+        """The number of the step, from 1."""
+
+@final
+class Report:
+    """The checks of a law or a residual. `str(report)` is a table for a terminal; a notebook shows Markdown."""
+
+    @property
+    def verdict(self) -> Literal["consistent", "inexact", "not checked", "wrong"]:
+        """The worst verdict of the findings. States at kinks do not count beside others."""
+
+    @property
+    def ok(self) -> bool:
+        """Whether the tangent is consistent, or inexact."""
+
+    @property
+    def subject(self) -> str:
+        """The name of the law or residual."""
+
+    @property
+    def convention(self) -> str:
+        """The meaning of the tangent, with the order of its components; empty for residuals."""
+
+    @property
+    def seed(self) -> int: ...
+    @property
+    def findings(self) -> list[Finding]: ...
+    @property
+    def diagnoses(self) -> list[Diagnosis]:
+        """Mistakes that explain a wrong tangent; empty if none of the frequent ones does."""
+
+    @property
+    def notes(self) -> list[str]:
+        """Sentences: the inputs that the law reads, mistakes that these states cannot show."""
+
+    @property
+    def exception(self) -> BaseException | None:
+        """The first exception that a function of yours raised."""
+
+    def assert_consistent(self, *, strict: bool = False) -> None:
+        """Raises an AssertionError with the report, unless the tangent is consistent; with `strict`, also if it is inexact.
+
+        A tangent that is not checked raises too. The cause of the error is `exception`.
+        """
+
+    def exit_code(self, *, strict: bool = False) -> int:
+        """0 consistent or inexact, 1 wrong, 3 not checked; inexact is 1 with `strict`."""
+
+    def to_markdown(self, *, strict: bool = False) -> str: ...
+    def to_json(self, *, strict: bool = False) -> str:
+        """All numbers. `verification/tangent-check/src/report/json.schema.json` describes the format."""
+
+    def to_junit(self, *, strict: bool = False) -> str:
+        """JUnit XML."""
+
+    def to_sarif(self, file: str | None = None, *, strict: bool = False) -> str:
+        """A SARIF 2.1.0 log, whose results point to `file`."""
+
+    def to_github(self, file: str | None = None, *, strict: bool = False) -> str:
+        """Annotations of GitHub Actions, which point to `file`: print them."""
+
+    def _repr_markdown_(self) -> str: ...
+
+@final
+class Finding:
+    """The check of one tangent in one state."""
+
+    @property
+    def name(self) -> str:
+        """The state or term."""
+
+    @property
+    def verdict(self) -> Literal["consistent", "inexact", "not checked", "wrong"]: ...
+    @property
+    def reason(
+        self,
+    ) -> Literal["kink", "nothing exercised", "zero response", "too noisy", "control missed", "call failed"] | None:
+        """Why the tangent was not checked."""
+
+    @property
+    def sentence(self) -> str | None:
+        """`reason` in a sentence, with its numbers or the text of an exception."""
+
+    @property
+    def worst(self) -> Entry | None:
+        """The entry that deviates most."""
+
+    @property
+    def deviation(self) -> float:
+        """The greatest |claimed − measured|, relative to the greatest entry of the measured tangent."""
+
+    @property
+    def error(self) -> float:
+        """The greatest estimated error of the differences, with the same scale."""
+
+    @property
+    def noise(self) -> float:
+        """The noise of the response, relative to its greatest component."""
+
+    @property
+    def control(self) -> float | None:
+        """The smallest planted error that the check saw, relative to the spoiled entry."""
+
+    @property
+    def calls(self) -> int:
+        """Calls of the stress or residual."""
+
+    @property
+    def claimed(self) -> NDArray[np.float64]:
+        """The tangent as claimed; beyond 30 unknowns its products with random directions, a column each."""
+
+    @property
+    def measured(self) -> NDArray[np.float64]:
+        """The tangent as measured. Entries that could not be measured are NaN."""
+
+    @property
+    def errors(self) -> NDArray[np.float64]:
+        """The estimated error of each measured entry."""
+
+@final
+class Entry:
+    """An entry of a tangent."""
+
+    @property
+    def row(self) -> int:
+        """From 0."""
+
+    @property
+    def column(self) -> int:
+        """From 0."""
+
+    @property
+    def claimed(self) -> float: ...
+    @property
+    def measured(self) -> float: ...
+    @property
+    def error(self) -> float:
+        """The estimated error of `measured`."""
+
+@final
+class Diagnosis:
+    """A frequent mistake that explains a wrong tangent."""
+
+    @property
+    def sentence(self) -> str: ...
+    @property
+    def candidates(self) -> list[str]:
+        """All mistakes that explain the tangent equally well in the states tried; one if the diagnosis is unique."""
+
+    @property
+    def states_that_tell(self) -> list[str]:
+        """States that would tell the candidates apart."""
+
+    @property
+    def coefficient(self) -> float | None:
+        """The coefficient of a missing or surplus term."""
+
+@final
+class NewtonOrder:
+    """The order of convergence that residual norms show: `str(order)` is "quadratic (2.0)", for instance."""
+
+    @property
+    def kind(self) -> Literal["quadratic", "superlinear", "linear", "round-off at once", "unknown", "not finite"]: ...
+    @property
+    def order(self) -> float | None: ...
+    @property
+    def orders(self) -> list[float | None]:
+        """The order that each iteration shows, from the second on; None where it shows none."""
+
+    @property
+    def is_quadratic(self) -> bool:
+        """Whether the order is quadratic, or the norms reach round-off at once."""
