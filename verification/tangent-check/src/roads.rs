@@ -264,6 +264,29 @@ impl<'a> Perturbed<'a> {
         self.rated(&strain, h, &step, stress)
     }
 
+    /// The greatest component of the strain increment.
+    pub fn size(&self) -> f64 {
+        self.step.strain_increment.as_flattened().iter().fold(0.0, |most: f64, x| most.max(x.abs()))
+    }
+
+    /// The stress after the part s of the step, in the components of the law: 1 is the whole step.
+    ///
+    /// # Errors
+    /// The call failed, or F has no positive determinant there.
+    pub fn part(&mut self, s: f64) -> Result<Vec<f64>, CallFailed> {
+        let step = match self.road {
+            Road::Strain => {
+                Some(Step { strain_increment: scaled(s, &self.step.strain_increment), ..self.step.clone() })
+            }
+            Road::Gradient => {
+                let [before, after] = [&self.step.gradient_before, &self.step.gradient];
+                with_gradient(self.step, &sum(&scaled(s, after), 1.0 - s, before))
+            }
+        };
+        let step = step.ok_or_else(|| CallFailed(format!("The part {s} of the step left no F with det F > 0.")))?;
+        Ok(self.law.respond(&step)?.stress)
+    }
+
     /// The step with column k perturbed by h.
     ///
     /// # Errors

@@ -49,8 +49,19 @@ pub fn check_columns(
     value: &[f64],
     f: &mut dyn FnMut(usize, f64) -> Result<Vec<f64>, CallFailed>,
 ) -> Finding {
+    check_along(name, claimed, value, f, None)
+}
+
+/// [`check_columns`] with the loading, which costs up to 200 further calls where a deviation is below 1e-5.
+pub fn check_along(
+    name: &str,
+    claimed: &Matrix,
+    value: &[f64],
+    f: &mut dyn FnMut(usize, f64) -> Result<Vec<f64>, CallFailed>,
+    loading: Option<Loading<'_>>,
+) -> Finding {
     let ladder = if claimed.columns > FEW { Ladder::coarse() } else { Ladder::default() };
-    check_columns_on(name, claimed, value, ladder, f, None)
+    check_columns_on(name, claimed, value, ladder, f, loading)
 }
 
 /// [`check_columns`] with a ladder of the caller's choice, for columns that are not strains, and with the loading.

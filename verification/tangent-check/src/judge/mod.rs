@@ -6,7 +6,7 @@ mod directions;
 mod evidence;
 mod loose;
 
-pub use check::{Loading, check_columns, check_columns_on, measure};
+pub use check::{Loading, check_along, check_columns, check_columns_on, measure};
 pub use directions::{Directions, Product, Residual, check_directions};
 pub use loose::Jump;
 

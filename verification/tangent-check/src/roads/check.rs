@@ -4,11 +4,12 @@ use super::{History, Input, Perturbed, Road, inputs_read, probe, roads};
 use crate::convention::{Configuration, Convention, cauchy_stress};
 use crate::diagnosis::{Elsewhere, Measured, Observation, diagnose, invisible};
 use crate::finding::{Finding, Reason, Report, Verdict};
-use crate::judge::check_columns;
+use crate::judge::{Loading, check_along};
 use crate::law::{CallFailed, Law, Response, Step};
 use crate::matrix::Matrix;
 use crate::states::Path;
 use crate::tensor::{exponential, scaled};
+use std::cell::RefCell;
 
 /// The response with column k perturbed by h.
 pub type Perturbation<'a> = dyn FnMut(usize, f64) -> Result<Vec<f64>, CallFailed> + 'a;
@@ -50,11 +51,35 @@ impl Travelled {
 /// Every step takes stress and internal variables from the response before. A law that reads both F and Δε is checked on both roads;
 /// the report has the findings of the road on which fewer states are wrong, and a note about the other.
 pub fn check_law(law: &mut dyn Law, paths: &[Path], seed: u64) -> Report {
-    check_law_by(law, paths, seed, &mut |name, claimed, value, f| check_columns(name, claimed, value, f))
+    let mut check = |name: &str, claimed: &Matrix, perturbed: &mut Perturbed| checked(name, claimed, perturbed);
+    report(law, paths, seed, &mut check)
 }
 
 /// [`check_law`] with another way to check a tangent column by column.
 pub fn check_law_by(law: &mut dyn Law, paths: &[Path], seed: u64, check: &mut CheckColumns) -> Report {
+    let mut check = |name: &str, claimed: &Matrix, perturbed: &mut Perturbed| match perturbed.value(0, 0.0) {
+        Ok(value) => check(name, claimed, &value, &mut |k, h| perturbed.value(k, h)),
+        Err(failed) => not_checked(name, failed),
+    };
+    report(law, paths, seed, &mut check)
+}
+
+/// The check of the tangent of one perturbed step.
+type Check<'a> = dyn FnMut(&str, &Matrix, &mut Perturbed) -> Finding + 'a;
+
+/// The check by differences. It also looks along the step for jumps of a loose local iteration.
+fn checked(name: &str, claimed: &Matrix, perturbed: &mut Perturbed) -> Finding {
+    let value = match perturbed.value(0, 0.0) {
+        Ok(value) => value,
+        Err(failed) => return not_checked(name, failed),
+    };
+    let shared = RefCell::new(perturbed);
+    let size = shared.borrow().size();
+    let loading = Loading { size, respond: &mut |part| shared.borrow_mut().part(part) };
+    check_along(name, claimed, &value, &mut |k, h| shared.borrow_mut().value(k, h), Some(loading))
+}
+
+fn report(law: &mut dyn Law, paths: &[Path], seed: u64, check: &mut Check) -> Report {
     let convention = law.convention();
     let mut report = Report {
         subject: law.name(),
@@ -190,14 +215,11 @@ fn note_of_roads(travelled: &[Travelled]) -> Option<String> {
 }
 
 /// Checks all visits on a road.
-fn travel(law: &mut dyn Law, road: Road, visits: &[Visit], check: &mut CheckColumns) -> Travelled {
+fn travel(law: &mut dyn Law, road: Road, visits: &[Visit], check: &mut Check) -> Travelled {
     let mut findings = Vec::new();
     for visit in visits {
         let mut perturbed = Perturbed::new(law, &visit.step, road);
-        findings.push(match perturbed.value(0, 0.0) {
-            Ok(value) => check(&visit.name, &visit.response.tangent, &value, &mut |k, h| perturbed.value(k, h)),
-            Err(failed) => not_checked(&visit.name, failed),
-        });
+        findings.push(check(&visit.name, &visit.response.tangent, &mut perturbed));
     }
     Travelled { road, findings }
 }
