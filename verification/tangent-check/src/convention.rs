@@ -81,6 +81,18 @@ impl Measure {
         matches!(self, Self::PiolaByGradient | Self::CauchyByGradient | Self::KirchhoffByGradient)
     }
 
+    /// The symbols of the stress and of the strain: P by F, S by E. Rates have D, the rate of deformation.
+    pub fn symbols(self) -> [&'static str; 2] {
+        match self {
+            Self::PiolaByGradient => ["P", "F"],
+            Self::SecondPiolaByGreen => ["S", "E"],
+            Self::CauchyByStrain => ["σ", "ε"],
+            Self::JaumannKirchhoff | Self::JaumannCauchy | Self::Truesdell | Self::GreenNaghdi => ["σ", "D"],
+            Self::CauchyByGradient => ["σ", "F"],
+            Self::KirchhoffByGradient => ["τ", "F"],
+        }
+    }
+
     /// The measure in words, with its symbol.
     pub fn words(self) -> &'static str {
         match self {
@@ -152,6 +164,12 @@ impl Components {
     /// The names of the components: "11", "22", "33", "12", …
     pub fn names(&self) -> Vec<String> {
         self.pairs.iter().map(|(i, j)| format!("{}{}", i + 1, j + 1)).collect()
+    }
+
+    /// The names of the components of a tensor with this symbol: "σ₁₁", "σ₂₂", …
+    pub fn names_of(&self, symbol: &str) -> Vec<String> {
+        let index = |i: usize| ['₁', '₂', '₃'].get(i).copied().unwrap_or('?');
+        self.pairs.iter().map(|(i, j)| format!("{symbol}{}{}", index(*i), index(*j))).collect()
     }
 
     /// Whether every component stands for an entry of a 3×3 tensor, none twice, with a factor of the shears that is not zero.

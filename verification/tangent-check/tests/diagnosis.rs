@@ -1,4 +1,9 @@
 //! Planted mistakes and their names.
+//!
+//! By default each mistake is planted in one law, and each law has several. This command plants each mistake in each law, and prints
+//! the table; it takes half a minute:
+//!
+//! `cargo test --release -p tangent-check --test diagnosis -- --ignored --nocapture`
 
 mod laws;
 
@@ -111,7 +116,7 @@ fn outcome(report: &Report, words: &str) -> Outcome {
     }
 }
 
-/// Plants all mistakes in one law and prints a line for each.
+/// Plants mistakes in one law and prints a line for each: how many are named, unnamed, invisible, and misnamed.
 fn table(formula: &dyn Formula, convention: &Convention, rows: &[Row]) -> [usize; 4] {
     let paths = all_paths(formula, convention);
     let mut known = Known::new();
@@ -126,6 +131,11 @@ fn table(formula: &dyn Formula, convention: &Convention, rows: &[Row]) -> [usize
     let mut counts = [0; 4];
     for (mistake, words) in rows {
         let report = run(&mut planted(formula, *mistake, convention), &paths, &mut known);
+        if OUTSIDE.contains(mistake) {
+            assert_eq!(report.verdict(), Verdict::Wrong, "{} {mistake:?}", formula.name());
+            assert!(report.diagnoses.is_empty(), "{} {mistake:?}: {:?}", formula.name(), report.diagnoses);
+            continue;
+        }
         let outcome = outcome(&report, words);
         println!("    {words:60} {outcome:?}");
         let place = match outcome {
@@ -139,15 +149,42 @@ fn table(formula: &dyn Formula, convention: &Convention, rows: &[Row]) -> [usize
     counts
 }
 
-#[test]
-fn planted_mistakes_are_named() {
+/// The mistakes of the list and those outside of it, with the law that shows each in the short table.
+fn mistakes() -> Vec<(Row, usize)> {
+    let outside = OUTSIDE.map(|mistake| (mistake, ""));
+    let shown_by = |(index, row): (usize, Row)| match row.0 {
+        // Flow without association: the only tangent that is not symmetric.
+        Mistake::Transposed | Mistake::Symmetrised => (row, 5),
+        Mistake::Elastic | Mistake::Continuum => (row, 3),
+        _ => (row, index % 7),
+    };
+    listed().into_iter().chain(outside).enumerate().map(shown_by).collect()
+}
+
+/// Plants the chosen mistakes in each law.
+fn tables(chosen: impl Fn(usize, usize) -> bool) -> [usize; 4] {
     let mut total = [0; 4];
-    for formula in formulas() {
-        let counts = table(formula.as_ref(), &Convention::abaqus(Measure::JaumannKirchhoff), &listed());
+    for (law, formula) in formulas().iter().enumerate() {
+        let rows: Vec<Row> = mistakes().into_iter().filter(|(_, by)| chosen(law, *by)).map(|(row, _)| row).collect();
+        let counts = table(formula.as_ref(), &Convention::abaqus(Measure::JaumannKirchhoff), &rows);
         total = std::array::from_fn(|k| total[k] + counts[k]);
     }
     let [named, unnamed, invisible, misnamed] = total;
     println!("named {named}, unnamed {unnamed}, invisible {invisible}, misnamed {misnamed}");
+    total
+}
+
+#[test]
+fn planted_mistakes_are_named() {
+    let [named, _, _, misnamed] = tables(|law, by| law == by);
+    assert_eq!(misnamed, 0);
+    assert_eq!(named, listed().len());
+}
+
+#[test]
+#[ignore = "takes half a minute"]
+fn all_planted_mistakes_are_named() {
+    let [named, unnamed, _, misnamed] = tables(|_, _| true);
     assert_eq!(misnamed, 0);
     assert!(named as f64 >= 0.8 * (named + unnamed) as f64);
 }
@@ -199,21 +236,6 @@ fn mistakes_in_other_measures_are_named() {
     count(&DruckerPrager, Convention::abaqus(Measure::JaumannCauchy), &strain[2..3]);
     count(&NeoHookean, Convention::abaqus_plane(Measure::JaumannKirchhoff), plane);
     assert_eq!(misnamed, 0);
-}
-
-#[test]
-fn mistakes_outside_the_list_stay_unnamed() {
-    for formula in formulas() {
-        let formula = formula.as_ref();
-        let convention = Convention::abaqus(Measure::JaumannKirchhoff);
-        let paths = all_paths(formula, &convention);
-        let mut known = Known::new();
-        for mistake in OUTSIDE {
-            let report = run(&mut planted(formula, mistake, &convention), &paths, &mut known);
-            assert_eq!(report.verdict(), Verdict::Wrong, "{} {mistake:?}", formula.name());
-            assert!(report.diagnoses.is_empty(), "{} {mistake:?}: {:?}", formula.name(), report.diagnoses);
-        }
-    }
 }
 
 /// A law given by a function of the step: stress and tangent.

@@ -81,11 +81,12 @@ fn checked(name: &str, claimed: &Matrix, perturbed: &mut Perturbed) -> Finding {
 
 fn report(law: &mut dyn Law, paths: &[Path], seed: u64, check: &mut Check) -> Report {
     let convention = law.convention();
+    let [stress, strain] = convention.measure.symbols();
     let mut report = Report {
         subject: law.name(),
         convention: convention.words(),
-        rows: convention.stress.names(),
-        columns: convention.strain.names(),
+        rows: convention.stress.names_of(stress),
+        columns: convention.strain.names_of(strain),
         seed,
         findings: Vec::new(),
         diagnoses: Vec::new(),
@@ -332,8 +333,12 @@ fn both_sides(
     let zeros = Measured { tangent: Matrix::zeros(rows, columns), errors: Matrix::zeros(rows, columns) };
     let mut sides = [zeros.clone(), zeros];
     for column in 0..columns {
-        let forward = flows(law, &step, road, (column, GREATEST), flowing)?;
-        let backward = flows(law, &step, road, (column, -GREATEST), flowing)?;
+        let forward = changes(law, &step, road, (column, GREATEST))?;
+        let backward = changes(law, &step, road, (column, -GREATEST))?;
+        // Damage grows from the first strain on, but rests while the body is unloaded.
+        let by_flow = |k: &usize| flowing.contains(k) || forward[*k] != backward[*k];
+        let by_flow: Vec<usize> = (0..forward.len()).filter(by_flow).collect();
+        let [forward, backward] = [forward, backward].map(|changes| by_flow.iter().any(|k| changes[*k]));
         let elastic = if forward { -1.0 } else { 1.0 };
         for (side, sign) in sides.iter_mut().zip([elastic, -elastic]) {
             let mut perturbed = Perturbed::new(law, &step, road);
@@ -348,11 +353,11 @@ fn both_sides(
     Some(sides)
 }
 
-/// Whether a perturbation of a column by h changes variables that change by flow alone.
-fn flows(law: &mut dyn Law, step: &Step, road: Road, (column, h): (usize, f64), flowing: &[usize]) -> Option<bool> {
+/// Whether a perturbation of a column by h changes each internal variable. `None` if a call fails or loses variables.
+fn changes(law: &mut dyn Law, step: &Step, road: Road, (column, h): (usize, f64)) -> Option<Vec<bool>> {
     let perturbed = Perturbed::new(law, step, road).step(column, h).ok()?;
     let state = law.respond(&perturbed).ok()?.state;
-    Some(flowing.iter().any(|k| state.get(*k) != step.state.get(*k)))
+    (state.len() == step.state.len()).then(|| state.iter().zip(&step.state).map(|(new, old)| new != old).collect())
 }
 
 /// The greatest perturbation of the one-sided derivatives.
