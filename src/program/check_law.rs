@@ -59,7 +59,8 @@ pub struct CheckLaw {
     /// The seed of the states. The same seed gives the same report.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// A report: terminal, markdown, junit, github, sarif or json, to standard output or to a file [default: terminal].
+    /// A report: terminal, terminal-full (each state a row), markdown, junit, github, sarif or json, to standard output or to a file
+    /// [default: terminal].
     #[arg(long, value_name = "FORMAT[=FILE]", value_parser = wanted)]
     report: Vec<Wanted>,
     /// The source file of the law, for annotations in a code review.

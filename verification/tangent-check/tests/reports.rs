@@ -158,7 +158,7 @@ fn formats_by_name() {
         assert_eq!(Format::from_name(format.name()), Ok(format));
     }
     let error = Format::from_name("x\nml").expect_err("no format has this name").to_string();
-    let names = "terminal, markdown, junit, github, sarif, json";
+    let names = "terminal, terminal-full, markdown, junit, github, sarif, json";
     assert_eq!(error, format!("There is no report format \"x\\nml\". Allowed are: {names}."));
 }
 

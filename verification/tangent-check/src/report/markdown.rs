@@ -30,7 +30,12 @@ pub(super) fn write(report: &Report, options: &Options) -> String {
     text + &format!("\nSeed of the states: {}\n", report.seed)
 }
 
+/// All findings in a table that is folded up.
 fn table(text: &mut String, report: &Report) {
+    if let Some(summary) = words::summary(report) {
+        *text += &format!("\n{}\n", escaped(&summary));
+    }
+    *text += "\n<details><summary>All findings</summary>\n";
     *text += "\n| name | verdict | deviation | error of the differences | smallest planted error seen | calls |\n";
     *text += "|---|---|--:|--:|--:|--:|\n";
     let mut findings = report.findings.iter();
@@ -42,6 +47,7 @@ fn table(text: &mut String, report: &Report) {
     if findings.len() > 0 {
         *text += &format!("\n{} more rows are left out.\n", findings.len());
     }
+    *text += "\n</details>\n";
 }
 
 fn row(finding: &Finding) -> String {

@@ -1,4 +1,4 @@
-//! Reports for people and machines: a [`Report`] in six formats.
+//! Reports for people and machines: a [`Report`] in seven formats.
 //!
 //! All formats agree about failure: the JUnit report has a failed test, the annotations an `::error` and the SARIF log a result of level
 //! `error` if and only if [`Report::exit_code`] is not 0. The same report gives the same bytes.
@@ -14,12 +14,15 @@ mod words;
 
 use crate::finding::{Finding, Reason, Report, Verdict};
 use std::fmt;
+use terminal::Rows;
 
 /// A format of a report.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
-    /// A table and sentences in plain text, at most 100 characters wide.
+    /// Plain text, at most 100 characters wide: the worst findings in a table and in sentences, the consistent ones in one sentence.
     Terminal,
+    /// [`Format::Terminal`] with all findings in the table.
+    TerminalFull,
     /// Markdown for the summary of a job: append it to the file `$GITHUB_STEP_SUMMARY`.
     Markdown,
     /// JUnit XML after the schema of Jenkins' xUnit plugin (junit-10.xsd).
@@ -50,12 +53,14 @@ pub struct UnknownFormat(pub String);
 
 impl Format {
     /// All formats.
-    pub const ALL: [Self; 6] = [Self::Terminal, Self::Markdown, Self::Junit, Self::Github, Self::Sarif, Self::Json];
+    pub const ALL: [Self; 7] =
+        [Self::Terminal, Self::TerminalFull, Self::Markdown, Self::Junit, Self::Github, Self::Sarif, Self::Json];
 
     /// The name on a command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Terminal => "terminal",
+            Self::TerminalFull => "terminal-full",
             Self::Markdown => "markdown",
             Self::Junit => "junit",
             Self::Github => "github",
@@ -125,7 +130,8 @@ impl Report {
 /// A report in a format. The text ends with a line break, unless it is empty: a consistent tangent has no annotations.
 pub fn write(report: &Report, format: Format, options: &Options) -> String {
     match format {
-        Format::Terminal => terminal::write(report, options),
+        Format::Terminal => terminal::write(report, options, Rows::Worst),
+        Format::TerminalFull => terminal::write(report, options, Rows::All),
         Format::Markdown => markdown::write(report, options),
         Format::Junit => junit::write(report, options),
         Format::Github => github::write(report, options),

@@ -8,16 +8,28 @@ use crate::finding::{Finding, Report, Verdict};
 const WIDTH: usize = 100;
 /// The space between two columns.
 const GAP: usize = 2;
-/// The greatest number of findings that are shown with their numbers below the table.
-const DETAILS: usize = 10;
+/// The greatest number of findings in the short table.
+const ROWS: usize = 10;
+/// The greatest number of findings that the short form shows with their worst entry or reason.
+const DETAILS: usize = 5;
 
-pub(super) fn write(report: &Report, options: &Options) -> String {
+/// The findings in the table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Rows {
+    /// All, in their order.
+    All,
+    /// Those that are not consistent, the worst first. The consistent ones are a sentence.
+    Worst,
+}
+
+pub(super) fn write(report: &Report, options: &Options, rows: Rows) -> String {
     let mut lines = Vec::new();
     heading(&mut lines, report);
-    if !report.findings.is_empty() {
-        table(&mut lines, report);
+    match rows {
+        Rows::All => table(&mut lines, &report.findings.iter().collect::<Vec<_>>()),
+        Rows::Worst => worst(&mut lines, report, options),
     }
-    details(&mut lines, report, options);
+    details(&mut lines, report, options, if rows == Rows::All { usize::MAX } else { DETAILS });
     for diagnosis in &report.diagnoses {
         paragraph(&mut lines, &format!("Diagnosis: {}", words::diagnosis(diagnosis)));
     }
@@ -45,10 +57,28 @@ fn heading(lines: &mut Vec<String>, report: &Report) {
     blank(lines);
 }
 
+/// The worst findings in a table, the consistent ones in a sentence.
+fn worst(lines: &mut Vec<String>, report: &Report, options: &Options) {
+    let severities = [Severity::Error, Severity::Warning, Severity::Skipped];
+    let findings: Vec<&Finding> =
+        severities.into_iter().flat_map(|severity| worst_first(report, options, severity)).collect();
+    table(lines, &findings[..findings.len().min(ROWS)]);
+    if findings.len() > ROWS {
+        paragraph(lines, &format!("{} more are not shown. The format terminal-full shows all.", findings.len() - ROWS));
+    }
+    if let Some(summary) = words::summary(report) {
+        paragraph(lines, &summary);
+    }
+    blank(lines);
+}
+
 /// A row for each finding. The name takes the room that the other columns leave, at least 40 characters.
-fn table(lines: &mut Vec<String>, report: &Report) {
+fn table(lines: &mut Vec<String>, findings: &[&Finding]) {
+    if findings.is_empty() {
+        return;
+    }
     let mut rows = vec![["name", "verdict", "deviation", "error", "seen", "calls"].map(str::to_owned)];
-    rows.extend(report.findings.iter().map(cells));
+    rows.extend(findings.iter().map(|finding| cells(finding)));
     let mut widths = [0; 6];
     for row in &rows {
         for (width, cell) in widths.iter_mut().zip(row) {
@@ -72,6 +102,7 @@ fn table(lines: &mut Vec<String>, report: &Report) {
         "Deviation of the tangent and error of the differences: relative to the greatest entry. Seen: the smallest \
          planted error that the check saw, relative to the spoiled entry.",
     );
+    blank(lines);
 }
 
 /// The cells of a row. All but the name have at most 17, 9, 9, 9 and 6 characters.
@@ -86,19 +117,16 @@ fn cells(finding: &Finding) -> [String; 6] {
     ]
 }
 
-fn details(lines: &mut Vec<String>, report: &Report, options: &Options) {
+/// The worst entry, or the reason, of the first findings.
+fn details(lines: &mut Vec<String>, report: &Report, options: &Options, most: usize) {
     let mut findings = worst_first(report, options, Severity::Error);
     findings.extend(worst_first(report, options, Severity::Warning));
-    for finding in findings.iter().take(DETAILS) {
+    for finding in findings.iter().take(most) {
         blank(lines);
         paragraph(lines, &format!("{}: {}", capital(words::verdict(finding.verdict)), finding.name));
         for sentence in numbers(report, finding) {
             wrap(lines, "  ", &sentence);
         }
-    }
-    if findings.len() > DETAILS {
-        blank(lines);
-        paragraph(lines, &format!("{} more findings of this kind stand in the table.", findings.len() - DETAILS));
     }
     blank(lines);
 }

@@ -80,11 +80,13 @@ fn advice(reason: Option<&Reason>) -> &'static str {
     }
 }
 
-/// The name of an entry, ∂row/∂column. Names that are indices alone, "12", are spelt out. A component without a name is counted from 1.
+/// The name of an entry, ∂row/∂column. A rate is no derivative by the rate of deformation D: "σ₁₂ by D₁₃". Names that are indices
+/// alone, "12", are spelt out. A component without a name is counted from 1.
 fn entry_name(report: &Report, entry: &Entry) -> String {
     let index = |name: &str| name.starts_with(|first: char| first.is_ascii_digit());
     match (report.rows.get(entry.row), report.columns.get(entry.column)) {
         (Some(row), Some(column)) if index(row) => format!("component {row} by component {column}"),
+        (Some(row), Some(column)) if column.starts_with('D') => format!("{row} by {column}"),
         (Some(row), Some(column)) => format!("∂{row}/∂{column}"),
         _ => format!("row {}, column {}", entry.row.saturating_add(1), entry.column.saturating_add(1)),
     }
@@ -102,6 +104,28 @@ pub(super) fn entry(report: &Report, entry: &Entry) -> String {
     let digits = decimals(claimed, measured);
     let name = entry_name(report, entry);
     format!("{name}: claimed {claimed:.digits$e}, measured {measured:.digits$e} ± {error:.0e}")
+}
+
+/// The consistent findings in a sentence, with their greatest numbers; `None` without any.
+pub(super) fn summary(report: &Report) -> Option<String> {
+    let all: Vec<&Finding> = report.findings.iter().filter(|finding| finding.verdict == Verdict::Consistent).collect();
+    let greatest = |of: &dyn Fn(&Finding) -> f64| number(all.iter().map(|finding| of(finding)).fold(0.0, f64::max));
+    let deviation = greatest(&|finding| finding.deviation);
+    let error = greatest(&|finding| finding.error);
+    let seen = greatest(&|finding| finding.control.unwrap_or(f64::INFINITY));
+    let fewest = all.iter().map(|finding| finding.calls).min()?;
+    let most = all.iter().map(|finding| finding.calls).max()?;
+    let count = all.len();
+    let states = if count == 1 { "1 state is".to_owned() } else { format!("{count} states are") };
+    let cost = match (fewest, most) {
+        (fewest, most) if fewest == most => format!("{} calls", calls(most)),
+        _ => format!("{} to {} calls", calls(fewest), calls(most)),
+    };
+    Some(format!(
+        "{states} consistent: deviation ≤ {deviation} of the greatest entry, differences exact to {error}, planted errors seen from \
+         {seen} on, {cost}{}.",
+        if count == 1 { "" } else { " each" }
+    ))
 }
 
 /// A finding in sentences.
@@ -126,9 +150,6 @@ pub(super) fn finding(report: &Report, finding: &Finding) -> String {
 /// A diagnosis in sentences, with the mistakes that look the same and the states that tell them apart.
 pub(super) fn diagnosis(diagnosis: &Diagnosis) -> String {
     let mut text = diagnosis.sentence.clone();
-    if let Some(coefficient) = diagnosis.coefficient {
-        text += &format!(" The coefficient is {coefficient:.4e}.");
-    }
     if diagnosis.candidates.len() > 1 {
         text += &format!(" These mistakes look the same in the states tried: {}.", diagnosis.candidates.join("; "));
     }
