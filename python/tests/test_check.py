@@ -448,8 +448,9 @@ def test_residuals_that_cannot_be_checked():
     with pytest.raises(RuntimeError, match="only once"):
         bfree.check_tangent(fragile, np.eye(3), u)
     # At a kink the derivative to either side is right, and of others nothing is known.
-    assert bfree.check_tangent(lambda u: np.abs(u - 1), -np.eye(3), u).ok
-    assert bfree.check_tangent(lambda u: np.abs(u - 1), np.eye(3) / 3, u).findings[0].reason == "kink"
+    kinked = lambda u: u + np.abs(u - 1)
+    assert bfree.check_tangent(kinked, 2 * np.eye(3), u).ok
+    assert bfree.check_tangent(kinked, np.eye(3) / 3, u).findings[0].reason == "kink"
     assert bfree.check_tangent(lambda u: 0 * u, np.zeros((3, 3)), u).findings[0].reason == "zero response"
     assert bfree.check_tangent(lambda u: 0 * u + 1, np.zeros((3, 3)), u).findings[0].reason == "nothing exercised"
 
