@@ -81,7 +81,7 @@ pub(super) const FAULTS: &[ShippedFault] = &[
     fault("sweep: functions beside a wall as if it were far", SWEEP, POINTS),
     fault("inertia: the residual lacks the consistent part", TANGENT, DYNAMICS),
     fault("deformation: F without G H_r", TANGENT, POINTS),
-    fault("stress: F_n is transposed", TANGENT, POINTS),
+    fault("stress: F_r is transposed", TANGENT, POINTS),
     fault("stress: no geometric part without a closed form", TANGENT, POINTS),
     fault("stress: the energy lacks V_0", TANGENT, POINTS),
     fault("damping: the product has the factor of the acceleration", TANGENT, DYNAMICS),
