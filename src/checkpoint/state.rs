@@ -123,12 +123,15 @@ fn reference<const D: usize>(arrays: &Arrays, particles: usize) -> Result<Option
     if fits { Ok(Some(reference)) } else { Err("a reference configuration of other particles".into()) }
 }
 
+/// A nodal state, and Δφ/Δt.
+type Nodes<const D: usize> = (Nodal<D>, Vec<Vector<f64, D>>);
+
 /// The state of the nodes of a grid that is not reset, if there is one, and Δφ/Δt. The number of nodes cannot be checked here, because only
 /// a step knows it.
 ///
 /// # Errors
 /// The nodal fields differ in length.
-fn grid<const D: usize>(arrays: &Arrays) -> Result<Option<(Nodal<D>, Vec<Vector<f64, D>>)>, String> {
+fn grid<const D: usize>(arrays: &Arrays) -> Result<Option<Nodes<D>>, String> {
     fn field<T: Element>(arrays: &Arrays, name: &str) -> Pooled<T> {
         Pool::default().collect(values(arrays, name))
     }

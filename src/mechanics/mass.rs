@@ -14,6 +14,9 @@ const LIGHT: f64 = 1e-14;
 /// Relative residual of the projection with a consistent mass.
 const PROJECTION_TOLERANCE: f64 = 1e-12;
 
+/// Two fields at the nodes.
+type TwoFields<const D: usize> = [Pooled<Vector<f64, D>>; 2];
+
 /// M̃ on the active nodes.
 #[derive(Clone, Copy, Debug)]
 pub struct Mass<'a, const D: usize> {
@@ -67,10 +70,7 @@ impl<const D: usize> Mass<'_, D> {
     ///
     /// # Errors
     /// The sums overflow.
-    pub(crate) fn project(
-        &self,
-        fields: [&[Vector<f64, D>]; 2],
-    ) -> Result<([Pooled<Vector<f64, D>>; 2], usize), LinearError> {
+    pub(crate) fn project(&self, fields: [&[Vector<f64, D>]; 2]) -> Result<(TwoFields<D>, usize), LinearError> {
         let followers = followers(self.supports);
         let lumped = restricted(&followers, self.lumped);
         let right = |field: &[Vector<f64, D>]| {

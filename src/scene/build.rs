@@ -153,7 +153,6 @@ impl Scene {
                 forcing: krylov.forcing,
                 krylov: krylov.method,
                 max_krylov_iterations: krylov.max_iterations as usize,
-                ..NewtonSettings::default()
             },
             preconditioner: krylov.preconditioner,
             error_tolerance: self.time.adaptive.map(|adaptive| adaptive.tolerance),

@@ -295,8 +295,7 @@ fn cone<const D: usize>(
 
 /// Checks the radii of a cone. One of them may be 0.
 fn check_radii(radii: [f64; 2], problems: &mut Problems, path: &str) -> bool {
-    let check = |(i, radius)| problems.between(&format!("{path}[{i}]"), radius, 0.0, LARGEST);
-    let ok = radii.into_iter().enumerate().map(check).fold(true, |all, ok| all && ok);
+    let ok = [0, 1].map(|i| problems.between(&format!("{path}[{i}]"), radii[i], 0.0, LARGEST)) == [true; 2];
     problems.require(!ok || radii != [0.0, 0.0], path, "[0, 0]", "one of the two must be > 0");
     ok && radii != [0.0, 0.0]
 }

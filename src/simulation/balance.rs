@@ -102,7 +102,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         if let Some(sentence) = self.bodies.iter().find_map(|body| body.law.last_failure()) {
             return StepError::LawFailed { sentence, source: error };
         }
-        if !equilibrium.step.nodal.is_static() || matches!(error.cause, NewtonFailure::Stopped { .. }) {
+        if !equilibrium.step.nodal.is_static() || matches!(error.cause, NewtonFailure::Stopped) {
             return StepError::Newton(error);
         }
         match loose(&self.grid, equilibrium, supports.active()) {

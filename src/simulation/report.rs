@@ -176,7 +176,7 @@ pub enum StepError {
 impl StepError {
     /// Whether the step was [stopped](crate::solver::Stop).
     pub fn is_stopped(&self) -> bool {
-        matches!(self, Self::Newton(error) if matches!(error.cause, NewtonFailure::Stopped { .. }))
+        matches!(self, Self::Newton(error) if matches!(error.cause, NewtonFailure::Stopped))
     }
 }
 

@@ -201,7 +201,7 @@ fn charts(directory: &Path, report: &Value) -> Result<Vec<(&'static str, String)
 /// Columns of the history as lines: each with its name, label and colour.
 fn lines(history: &Columns, columns: &[(&str, &str, &'static str)]) -> Result<Vec<Line>, OutputError> {
     let line =
-        |(name, label, color): &(&str, &str, &'static str)| Ok(Line::new(label, *color, history.pairs("time", name)?));
+        |(name, label, color): &(&str, &str, &'static str)| Ok(Line::new(label, color, history.pairs("time", name)?));
     columns.iter().map(line).collect()
 }
 

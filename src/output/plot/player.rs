@@ -225,7 +225,7 @@ mod tests {
     fn motion_is_seen_from_the_side() {
         // a ball that falls along y, one along z, a bar drawn out along x; a beam along y that bends towards z; nothing moves
         let motions = [[0.1, 2.0, 0.1000001], [0.1, 0.1, 2.0], [1.0, 0.3, 0.3], [0.0, 1.0, 3.0], [0.0; 3]];
-        assert_eq!(motions.map(|motion| plane_of(motion)), [[0, 1], [0, 2], [0, 1], [1, 2], [0, 1]]);
+        assert_eq!(motions.map(plane_of), [[0, 1], [0, 2], [0, 1], [1, 2], [0, 1]]);
     }
 
     #[test]
