@@ -55,7 +55,7 @@ pub(super) fn largest(operator: &dyn LinearOperator, jacobi: &dyn Fn(&[f64], &mu
     if largest > 0.0 { largest } else { 1.0 }
 }
 
-/// Smooths: [`chebyshev`] for the upper part of the spectrum of D⁻¹K, whose largest eigenvalue is `largest`.
+/// Smooths: x ← x + p(D⁻¹K) D⁻¹ (b − K x) with a Chebyshev polynomial p. `zero` tells that x = 0 at the start, which saves a product.
 pub(super) fn smooth(
     operator: &dyn LinearOperator,
     jacobi: &dyn Fn(&[f64], &mut [f64]),
@@ -64,38 +64,28 @@ pub(super) fn smooth(
     x: &mut [f64],
     zero: bool,
 ) {
-    chebyshev(&|x, y| operator.apply(x, y), jacobi, [largest / PART, largest], DEGREE, b, x, zero);
-}
-
-/// x ← x + p(D⁻¹K) D⁻¹ (b − K x) with the Chebyshev polynomial p ≈ 1/λ of this degree, for eigenvalues λ of D⁻¹K between `lower` and
-/// `upper`. `zero` tells that x = 0 at the start, which saves a product.
-pub(super) fn chebyshev(
-    product: &dyn Fn(&[f64], &mut [f64]),
-    jacobi: &dyn Fn(&[f64], &mut [f64]),
-    [lower, upper]: [f64; 2],
-    degree: usize,
-    b: &[f64],
-    x: &mut [f64],
-    zero: bool,
-) {
+    let n = b.len();
+    let (upper, lower) = (largest, largest / PART);
     let (theta, delta) = (0.5 * (upper + lower), 0.5 * (upper - lower));
     let sigma = theta / delta;
-    let mut rho = 1.0 / sigma;
-    let (mut r, mut z) = (b.to_vec(), vec![0.0; b.len()]);
+    let (mut r, mut z, mut p) = (b.to_vec(), vec![0.0; n], vec![0.0; n]);
     if !zero {
-        product(x, &mut z);
+        operator.apply(x, &mut z);
         r.iter_mut().zip(&z).for_each(|(r, z)| *r -= z);
     }
     jacobi(&r, &mut z);
-    let mut p: Vec<f64> = z.iter().map(|z| z / theta).collect();
-    x.iter_mut().zip(&p).for_each(|(x, p)| *x += p);
-    for _ in 1..degree {
-        product(&p, &mut z);
+    p.iter_mut().zip(&z).for_each(|(p, z)| *p = z / theta);
+    let mut rho = 1.0 / sigma;
+    for step in 0..DEGREE {
+        x.iter_mut().zip(&p).for_each(|(x, p)| *x += p);
+        if step + 1 == DEGREE {
+            break;
+        }
+        operator.apply(&p, &mut z);
         r.iter_mut().zip(&z).for_each(|(r, z)| *r -= z);
         jacobi(&r, &mut z);
         let next = 1.0 / (2.0 * sigma - rho);
         p.iter_mut().zip(&z).for_each(|(p, z)| *p = next * rho * *p + 2.0 * next / delta * z);
-        x.iter_mut().zip(&p).for_each(|(x, p)| *x += p);
         rho = next;
     }
 }

@@ -2,7 +2,6 @@
 //! alternate from node to node hardly move the body. D⁻¹K is small for such patterns, and point smoothers damp them poorly. The filter Q Qᵀ
 //! with Q ≈ Π_axes ([1 4 1]/6)⁻¹ amplifies them: M = D⁻¹ + D^{−½} Q Qᵀ D^{−½} takes the place of D⁻¹.
 
-use super::chebyshev::chebyshev;
 use super::form::LocalForm;
 use crate::tensor::Tensor;
 use std::collections::HashMap;
@@ -62,19 +61,28 @@ impl Filter {
 
     /// x ← q(B) x with B = [1 4 1]/6 along an axis and the polynomial q ≈ 1/B.
     fn invert<const D: usize>(&self, axis: usize, x: &mut [f64]) {
-        let b = x.to_vec();
-        x.fill(0.0);
-        let product = |x: &[f64], y: &mut [f64]| self.product::<D>(axis, x, y);
-        chebyshev(&product, &|r, z| z.copy_from_slice(r), SPECTRUM, STEPS, &b, x, true);
+        let [lower, upper] = SPECTRUM;
+        let (theta, delta) = (0.5 * (upper + lower), 0.5 * (upper - lower));
+        let sigma = theta / delta;
+        let (mut r, mut rho) = (x.to_vec(), 1.0 / sigma);
+        let mut p: Vec<f64> = r.iter().map(|r| r / theta).collect();
+        x.copy_from_slice(&p);
+        for _ in 1..STEPS {
+            self.subtract_product::<D>(axis, &p, &mut r);
+            let next = 1.0 / (2.0 * sigma - rho);
+            p.iter_mut().zip(&r).for_each(|(p, r)| *p = next * rho * *p + 2.0 * next / delta * r);
+            x.iter_mut().zip(&p).for_each(|(x, p)| *x += p);
+            rho = next;
+        }
     }
 
-    /// y = B x
-    fn product<const D: usize>(&self, axis: usize, x: &[f64], y: &mut [f64]) {
+    /// r −= B p
+    fn subtract_product<const D: usize>(&self, axis: usize, p: &[f64], r: &mut [f64]) {
         for (node, beside) in self.beside[axis].iter().enumerate() {
             for i in 0..D {
-                let existing = beside.iter().filter(|&&other| other != NONE);
-                let others: f64 = existing.map(|&other| x[other as usize * D + i]).sum();
-                y[node * D + i] = (4.0 * x[node * D + i] + others) / 6.0;
+                let others: f64 =
+                    beside.iter().filter(|&&other| other != NONE).map(|&other| p[other as usize * D + i]).sum();
+                r[node * D + i] -= (4.0 * p[node * D + i] + others) / 6.0;
             }
         }
     }
