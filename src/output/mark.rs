@@ -1,8 +1,8 @@
 //! A moment of a run from which its files can be continued.
 
 use super::OutputError;
+use super::counts::{Counts, Seconds};
 use super::files::Written;
-use super::report::{Counts, Seconds};
 use super::snapshots::SnapshotMark;
 use super::warnings::Watch;
 use serde::{Deserialize, Serialize};

@@ -15,6 +15,7 @@
 //! give back the same bits.
 
 pub mod contact;
+mod counts;
 mod csv;
 mod earlier;
 mod error;

@@ -1,8 +1,8 @@
 //! The text printed at the end of a run.
 
 use super::contact::Contact;
+use super::counts::{Counts, Seconds};
 use super::history::Energies;
-use super::report::{Counts, Seconds};
 use super::warnings::Warning;
 use crate::solver::Krylov;
 use std::fmt::{Display, Formatter, Result};

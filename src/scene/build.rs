@@ -3,39 +3,17 @@
 use super::filling::Builder;
 use super::transfer::Transfer;
 use super::vector::vector;
-use super::{Problems, Scene, shape};
+use super::{BuildError, Problems, Scene, shape};
 use crate::approximation::{Approximation, Cells};
 use crate::clock::Clock;
 use crate::grid::Grid;
-use crate::mechanics::loads::CurveError;
 use crate::mechanics::smoothing::Smoothing;
 use crate::particles::{self, Particles};
 use crate::shape::Shape;
 use crate::simulation::{Settings, Simulation};
 use crate::solver::NewtonSettings;
 use crate::tensor::Vector;
-use std::error::Error;
 use std::path::Path;
-
-/// Errors of building a simulation from a scene.
-#[derive(Debug, thiserror::Error)]
-pub enum BuildError {
-    /// Values that are not allowed: those of shapes read from files, or of a scene that was changed after it was read.
-    #[error("{0}")]
-    Values(Problems),
-    /// A table in time that was changed after the scene was read.
-    #[error(transparent)]
-    Curve(#[from] CurveError),
-    /// A failure that appears only with the particles, or in a file: the key, the cause, and what to do.
-    #[error("{0}: {1}")]
-    At(String, #[source] Box<dyn Error + Send + Sync>),
-}
-
-impl BuildError {
-    pub(super) fn at(path: impl Into<String>, source: impl Into<Box<dyn Error + Send + Sync>>) -> Self {
-        Self::At(path.into(), source.into())
-    }
-}
 
 impl Scene {
     /// The dimension: 1 (uniaxial strain), 2 (plane strain) or 3.

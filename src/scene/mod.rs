@@ -21,6 +21,7 @@ pub mod time;
 pub mod transfer;
 
 mod build;
+mod build_error;
 mod file;
 mod filling;
 mod json;
@@ -32,7 +33,7 @@ mod vector;
 mod warnings;
 
 pub use crate::problems::{Place, Problem, Problems};
-pub use build::BuildError;
+pub use build_error::BuildError;
 pub use file::FileError;
 pub use filling::BodyUse;
 pub use overrides::{Override, OverrideError};

@@ -4,13 +4,16 @@ use super::separable::Lme;
 use crate::approximation::product::{Place, inside};
 use crate::approximation::{ApproximationError, Scratch, Separable, ShapeFunction, Support, Validate};
 use crate::grid::{Grid, indices};
-use crate::tensor::{Tensor, Vector, determinant, inverse, outer};
+use crate::tensor::{Tensor, Vector, determinant, identity, inverse, outer};
+use argmin::core::{CostFunction, Error, Executor, State};
+use argmin::solver::neldermead::NelderMead;
 
 /// LME on the nodes with |D| < R_a = h sqrt(−ln TOL₀ / γ̂), the circle (sphere) of the paper, cut at the walls.
 ///
 /// 1. Connectivity (Algorithm 3): rounding gives the closest node. The nodes within the circle are kept from the rings around this node.
 /// 2. λ = argmin log Z (eq. 25), by Newton's method from the λ of the separable functions. An Armijo line search shortens the steps. The
-///    iteration ends when the error is at round-off.
+///    iteration ends when the error is at round-off. If Newton's method fails, a Nelder–Mead search without derivatives finds λ, and
+///    Newton's method refines it.
 /// 3. N, and ∇N = −N J⁻¹ D with J centred (eq. 27).
 ///
 /// On a wall λ is infinite, so a particle there is moved inside by [`LmeCircle::INSET`] h. The position then has an error of this size;
@@ -44,6 +47,9 @@ pub struct LmeCircle {
 const NEWTON_STEPS: usize = 100;
 /// Convergence tolerance for a Newton step |Δλ|h: after a step below this, the error is about the square of the step.
 const LAST_STEP: f64 = 1e-9;
+
+/// Largest number of Nelder–Mead iterations.
+const SEARCH_STEPS: u64 = 2000;
 
 impl LmeCircle {
     /// The smallest distance from a wall, in units of h. A particle closer to the wall, or on the wall, is treated at this distance.
@@ -93,6 +99,7 @@ impl LmeCircle {
 }
 
 /// The dual function log Z(λ) of one particle.
+#[derive(Clone, Copy)]
 struct Dual<'a, const D: usize> {
     gamma: f64,
     /// D of each node, in units of h.
@@ -131,10 +138,10 @@ impl<const D: usize> Dual<'_, D> {
         Moments { log_z, r, j }
     }
 
-    /// λ = argmin log Z by a damped Newton method; `None` if the method fails.
-    fn minimize(&self, start: Vector<f64, D>) -> Option<Vector<f64, D>> {
+    /// λ by a damped Newton method in at most `steps` steps; `None` if the method fails.
+    fn newton(&self, start: Vector<f64, D>, steps: usize) -> Option<Vector<f64, D>> {
         let mut lambda = start;
-        for _ in 0..NEWTON_STEPS {
+        for _ in 0..steps {
             let Moments { log_z, r, j } = self.moments(&lambda);
             let step = -solve(&j, &r)?;
             if step.amax() <= LAST_STEP {
@@ -153,6 +160,35 @@ impl<const D: usize> Dual<'_, D> {
             lambda += step * t;
         }
         None
+    }
+}
+
+impl<const D: usize> Dual<'_, D> {
+    /// λ by the Nelder–Mead simplex search, accurate to about the square root of round-off.
+    fn search(&self, start: Vector<f64, D>) -> Option<Vector<f64, D>> {
+        let around = (0..D).map(|k| start + identity::<f64, D>().column(k));
+        let simplex = std::iter::once(start).chain(around).map(|vertex| vertex.as_slice().to_vec()).collect();
+        let search = Executor::new(*self, NelderMead::new(simplex));
+        let result = search.configure(|state| state.max_iters(SEARCH_STEPS)).timer(false).run().ok()?;
+        let best = result.state().get_best_param()?;
+        (best.len() == D).then(|| Vector::from_column_slice(best))
+    }
+
+    /// λ = argmin log Z by Newton's method in at most `steps` steps. If this method fails, the search finds λ, and Newton's method refines
+    /// it.
+    fn minimize(&self, start: Vector<f64, D>, steps: usize) -> Option<Vector<f64, D>> {
+        self.newton(start, steps).or_else(|| self.newton(self.search(start)?, NEWTON_STEPS))
+    }
+}
+
+impl<const D: usize> CostFunction for Dual<'_, D> {
+    type Param = Vec<f64>;
+    type Output = f64;
+
+    fn cost(&self, lambda: &Vec<f64>) -> Result<f64, Error> {
+        // The search compares costs, and a comparison with NaN means nothing.
+        let log_z = self.log_z(&Vector::from_column_slice(lambda));
+        Ok(if log_z.is_finite() { log_z } else { f64::MAX })
     }
 }
 
@@ -209,7 +245,7 @@ impl ShapeFunction for LmeCircle {
             position: x.as_slice().to_vec(),
             residual: dual.moments(lambda).r.amax(),
         };
-        let lambda = dual.minimize(start).ok_or_else(|| failed(&start))?;
+        let lambda = dual.minimize(start, NEWTON_STEPS).ok_or_else(|| failed(&start))?;
         let Moments { log_z, r, j } = dual.moments(&lambda);
         if solve(&j, &r).is_none() {
             return Err(failed(&lambda));
@@ -236,10 +272,35 @@ impl ShapeFunction for LmeCircle {
 mod tests {
     use super::*;
 
+    /// D of the nodes −2 … 3 along both axes within R of `x`. A wall at −`below` cuts the first axis.
+    fn distances(x: [f64; 2], below: i32, radius: f64) -> Vec<[f64; 2]> {
+        (-2..=3)
+            .flat_map(|k| (-below..=3).map(move |i| [x[0] - f64::from(i), x[1] - f64::from(k)]))
+            .filter(|d| d[0].hypot(d[1]) < radius)
+            .collect()
+    }
+
+    #[test]
+    fn without_newton_the_search_finds_the_same_multipliers() {
+        for (x, below, gamma) in
+            [([0.3, 0.45], 2, 3.0), ([0.5, 0.5], 2, 0.8), ([0.001, 0.2], 0, 4.0), ([0.01, 0.98], 2, 9.0)]
+        {
+            let nodes = distances(x, below, Lme::new(gamma, 1e-6).radius);
+            let dual = Dual { gamma, distances: &nodes };
+            let newton = dual.newton(Vector::zeros(), NEWTON_STEPS).expect("inside the hull");
+            assert!(dual.moments(&newton).r.amax() < 1e-14);
+            assert!(dual.newton(Vector::zeros(), 0).is_none());
+            let search = dual.search(Vector::zeros()).expect("the search always answers");
+            assert!(dual.moments(&search).r.amax() < 1e-5, "{x:?}: {}", dual.moments(&search).r.amax());
+            let fallback = dual.minimize(Vector::zeros(), 0).expect("inside the hull");
+            assert!((fallback - newton).amax() < 1e-10, "{x:?}: {fallback} and {newton}");
+        }
+    }
+
     #[test]
     fn outside_the_hull_nothing_is_found() {
         // All nodes lie on one side, so log Z falls without limit.
         let nodes = [[0.5, 0.1], [0.5, -0.9], [1.5, 0.1]];
-        assert!(Dual { gamma: 3.0, distances: &nodes }.minimize(Vector::zeros()).is_none());
+        assert!(Dual { gamma: 3.0, distances: &nodes }.minimize(Vector::zeros(), NEWTON_STEPS).is_none());
     }
 }
