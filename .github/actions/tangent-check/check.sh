@@ -22,7 +22,11 @@ false) ;;
 esac
 [ -z "$PROPERTIES" ] || law+=("--properties=$PROPERTIES")
 [ -z "$STATE" ] || law+=("--state=$STATE")
+[ -z "$TANGENT" ] || law+=("--tangent=$TANGENT")
 [ -z "$SOURCE" ] || law+=("--source=$SOURCE")
+while IFS= read -r option; do
+    [ -z "$option" ] || law+=("$option")
+done <<<"$OPTIONS"
 
 mkdir -p "$REPORTS"
 summary=$REPORTS/summary.md

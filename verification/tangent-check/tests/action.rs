@@ -32,6 +32,8 @@ fn check(directory: &str, inputs: &[(&str, &str)], text: &str, code: u8) -> (Pat
         ("NAME", ""),
         ("PROPERTIES", ""),
         ("STATE", ""),
+        ("TANGENT", ""),
+        ("OPTIONS", ""),
         ("SOURCE", ""),
         ("STRICT", "false"),
         ("REPORTS", "tangent-check"),
@@ -73,6 +75,10 @@ fn inputs_become_arguments_and_never_commands() {
     assert_eq!(read(&directory, "output"), "exit-code=0\n");
     let (directory, _) = check("name", &[("INTERFACE", "mfront"), ("NAME", "Plasticity")], "text", 0);
     assert!(read(&directory, "arguments").starts_with("check-law\nlibmine.so\n--mfront\nPlasticity\n--report\n"));
+    let inputs = [("TANGENT", "strain"), ("OPTIONS", "--plane-strain\n--external=A b=1\n")];
+    let (directory, _) = check("options", &inputs, "text", 0);
+    let expected = "check-law\nlibmine.so\n--umat\n--tangent=strain\n--plane-strain\n--external=A b=1\n--report\n";
+    assert!(read(&directory, "arguments").starts_with(expected));
 }
 
 #[test]
@@ -109,7 +115,7 @@ fn the_script_reads_what_the_action_gives() {
     let declared: Vec<&str> = declared.into_iter().filter(|name| !name.starts_with(' ')).collect();
     let given: BTreeMap<&str, &str> =
         rest.lines().filter_map(|line| line.trim().strip_suffix(" }}")?.split_once(": ${{ inputs.")).collect();
-    assert_eq!(declared.len(), 8, "{declared:?}");
+    assert_eq!(declared.len(), 10, "{declared:?}");
     for (variable, input) in &given {
         assert!(declared.contains(input) && script.contains(&format!("${variable}")), "{variable}");
     }
