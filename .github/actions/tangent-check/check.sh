@@ -30,8 +30,8 @@ done <<<"$OPTIONS"
 
 mkdir -p "$REPORTS"
 summary=$REPORTS/summary.md
-# A summary of an earlier step must not stand for this one.
-rm -f "$summary"
+# Reports of an earlier step must not stand for this one.
+rm -f "$summary" "$REPORTS/junit.xml" "$REPORTS/results.sarif"
 code=0
 bfree check-law "$LIBRARY" "${law[@]}" --report terminal --report github --report "markdown=$summary" \
     --report "junit=$REPORTS/junit.xml" --report "sarif=$REPORTS/results.sarif" || code=$?

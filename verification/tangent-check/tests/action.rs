@@ -17,12 +17,14 @@ done
 exit "$CODE"
 "#;
 
-/// Runs the check with inputs, in an empty directory. The summary of an earlier step lies there.
+/// Runs the check with inputs, in a directory with the reports of an earlier step.
 fn check(directory: &str, inputs: &[(&str, &str)], text: &str, code: u8) -> (PathBuf, Output) {
     let directory = Path::new(env!("CARGO_TARGET_TMPDIR")).join(directory);
     let _ = fs::remove_dir_all(&directory);
     fs::create_dir_all(directory.join("tangent-check")).expect("a directory");
-    fs::write(directory.join("tangent-check/summary.md"), "an earlier step\n").expect("a file");
+    for report in ["summary.md", "junit.xml", "results.sarif"] {
+        fs::write(directory.join("tangent-check").join(report), "an earlier step\n").expect("a file");
+    }
     let program = directory.join("bfree");
     fs::write(&program, BFREE).expect("a file");
     fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).expect("a program");
@@ -93,6 +95,9 @@ fn failures_stay_failures() {
     assert_eq!(output.status.code(), Some(3), "no report is no success");
     assert!(String::from_utf8_lossy(&output.stdout).contains("::error title=tangent-check::"));
     assert_eq!(read(&directory, "job.md"), "", "the summary of an earlier step is not shown");
+    for report in ["summary.md", "junit.xml", "results.sarif"] {
+        assert!(!directory.join("tangent-check").join(report).exists(), "{report} is of an earlier step");
+    }
 }
 
 #[test]
