@@ -14,11 +14,12 @@ use tangent_check::library::{Description, Kind, LibraryLaw, umat};
 use tangent_check::report::{self, Format, Options};
 use tangent_check::roads::check_law;
 use tangent_check::states::{Path, for_law};
+use tangent_check::tensor::determinant;
 
 /// `bfree check-law`.
 #[derive(Args)]
 #[command(after_help = "The library runs in a child process: a crash, an endless loop or a STOP is a finding.\n\
-                        Exit codes: 0 consistent or inexact, 1 wrong, 2 the law cannot be called, 3 not checked.")]
+                        Exit codes: 0 consistent or inexact, 1 wrong, 2 the law cannot be called or an option is not allowed, 3 not checked.")]
 #[command(group(ArgGroup::new("kind").required(true)))]
 pub struct CheckLaw {
     /// The shared library: libmine.so. This command runs its code.
@@ -33,22 +34,23 @@ pub struct CheckLaw {
     #[arg(long, value_name = "NAME", group = "kind")]
     c: Option<String>,
     /// The properties (PROPS), in the order of the law.
-    #[arg(long, value_name = "X,X,…", value_delimiter = ',', allow_negative_numbers = true)]
+    #[arg(long, value_name = "X,X,…", value_delimiter = ',', allow_negative_numbers = true, value_parser = number)]
     properties: Vec<f64>,
     /// The internal variables (STATEV) of a UMAT: their number, or their names with values at rest, as in alpha=0,beta=1.
-    #[arg(long, value_name = "N|NAME=X,…", default_value = "0", value_parser = internal_variables)]
+    #[arg(long, value_name = "N|NAME=X,…", default_value = "0", value_parser = internal_variables, conflicts_with_all = ["mfront", "c"])]
     state: State,
     /// The meaning of a UMAT's DDSDDE.
-    #[arg(long, value_enum, default_value = "jaumann-kirchhoff")]
+    #[arg(long, value_enum, default_value = "jaumann-kirchhoff", conflicts_with_all = ["mfront", "c"])]
     tangent: Tangent,
     /// The name that a UMAT is called with (CMNAME).
-    #[arg(long, value_name = "NAME", default_value = "BFREE")]
+    #[arg(long, value_name = "NAME", default_value = "BFREE", conflicts_with_all = ["mfront", "c"])]
     name: String,
     /// The temperature (TEMP) of a UMAT.
-    #[arg(long, value_name = "T", default_value_t = 0.0, allow_negative_numbers = true)]
+    #[arg(long, value_name = "T", default_value_t = 0.0, allow_negative_numbers = true, value_parser = number,
+          conflicts_with_all = ["mfront", "c"])]
     temperature: f64,
     /// An external state variable of a behaviour of MFront, as in Temperature=300.
-    #[arg(long, value_name = "NAME=X", value_parser = named)]
+    #[arg(long, value_name = "NAME=X", value_parser = named, conflicts_with_all = ["umat", "c"])]
     external: Vec<(String, f64)>,
     /// Call the law in plane strain: four components for a UMAT (NTENS = 4).
     #[arg(long)]
@@ -70,8 +72,8 @@ pub struct CheckLaw {
     #[arg(long)]
     strict: bool,
     /// The longest time of a call in seconds.
-    #[arg(long, value_name = "S", default_value_t = 5.0)]
-    limit: f64,
+    #[arg(long, value_name = "S", default_value = "5", value_parser = seconds)]
+    limit: Duration,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -94,10 +96,22 @@ struct Wanted {
     file: Option<PathBuf>,
 }
 
+/// Parser of a finite number.
+fn number(text: &str) -> Result<f64, String> {
+    let value = text.trim().parse().ok().filter(|value: &f64| value.is_finite());
+    value.ok_or_else(|| "must be a finite number; commas without spaces separate several".to_owned())
+}
+
+/// Parser of `--limit`.
+fn seconds(text: &str) -> Result<Duration, String> {
+    let limit = number(text).ok().and_then(|limit| Duration::try_from_secs_f64(limit).ok());
+    limit.filter(|limit| !limit.is_zero()).ok_or_else(|| "must be a number of seconds above 0".to_owned())
+}
+
 /// Parser of `NAME=X`.
 fn named(text: &str) -> Result<(String, f64), String> {
     let (name, value) = text.split_once('=').ok_or("must be a name and a number, as in alpha=0")?;
-    let value = value.parse().map_err(|_| format!("the value of {name} must be a number"))?;
+    let value = number(value).map_err(|_| format!("the value of {name} must be a finite number"))?;
     Ok((name.to_owned(), value))
 }
 
@@ -106,7 +120,16 @@ fn internal_variables(text: &str) -> Result<State, String> {
     if let Ok(count) = text.parse::<u16>() {
         return Ok(umat::state(count.into()).into());
     }
-    let variable = |one: &str| if one.contains('=') { named(one) } else { Ok((one.to_owned(), 0.0)) };
+    let variable = |one: &str| {
+        let (name, value) = if one.contains('=') { named(one)? } else { (one.to_owned(), 0.0) };
+        let allowed = name.starts_with(|first: char| first.is_alphabetic() || first == '_');
+        allowed.then_some((name, value)).ok_or_else(|| {
+            format!(
+                "{one:?} must be a number from 0 to {}, or names that begin with a letter, as in alpha=0,beta=1",
+                u16::MAX
+            )
+        })
+    };
     text.split(',').map(variable).collect()
 }
 
@@ -139,15 +162,23 @@ enum Unusable {
     States { path: PathBuf, source: serde_json::Error },
     #[error("cannot write {}", path.display())]
     Write { path: PathBuf, source: std::io::Error },
-    #[error("--limit {0} must be a positive number of seconds")]
-    Limit(f64),
+    #[error("{}: path {name:?}, step {step}: F needs a positive determinant, and the length of a step must be positive", path.display())]
+    Step { path: PathBuf, name: String, step: usize },
+    #[error("{}: there is no path with a step", path.display())]
+    NoSteps { path: PathBuf },
+    #[error(
+        "the law fails in a first step of tiny strain. It was called with {properties} properties (--properties) and {state} internal variables (--state)\n  \
+             because: {sentence}"
+    )]
+    First { properties: usize, state: usize, sentence: String },
 }
 
 impl CheckLaw {
     /// Checks the law and writes the reports.
     pub fn execute(&self) -> Result<(), Failure> {
         let mut law = self.open()?;
-        let refused = |CallFailed(sentence)| Failure::scene(Unusable::Law(sentence));
+        let (properties, state) = (self.properties.len(), self.state.len());
+        let refused = |CallFailed(sentence)| Failure::scene(Unusable::First { properties, state, sentence });
         let paths = match &self.states {
             Some(file) => own_paths(file)?,
             None => for_law(&mut law, self.seed).map_err(refused)?,
@@ -178,10 +209,9 @@ impl CheckLaw {
             state: self.state.to_vec(),
             plane_strain: self.plane_strain,
         };
-        let limit = Duration::try_from_secs_f64(self.limit).ok().filter(|limit| !limit.is_zero());
-        let limit = limit.ok_or_else(|| Failure::scene(Unusable::Limit(self.limit)))?;
-        let host = Host::this_program().map_err(Failure::run)?;
-        let child = Child::start(host, description, limit);
+        // Exit code 1 is a wrong tangent.
+        let host = Host::this_program().map_err(Failure::scene)?;
+        let child = Child::start(host, description, self.limit);
         let child = child.map_err(|CallFailed(sentence)| Failure::scene(Unusable::Law(sentence)))?;
         Ok(LibraryLaw::new(Box::new(child)))
     }
@@ -195,7 +225,7 @@ impl CheckLaw {
             match file {
                 None => print(text.trim_end())?,
                 Some(path) => std::fs::write(path, text)
-                    .map_err(|source| Failure::run(Unusable::Write { path: path.clone(), source }))?,
+                    .map_err(|source| Failure::scene(Unusable::Write { path: path.clone(), source }))?,
             }
         }
         Ok(())
@@ -218,7 +248,18 @@ fn own_paths(file: &FilePath) -> Result<Vec<Path>, Failure> {
         Ok(text) => text,
         Err(source) => return Err(Failure::scene(Unusable::Read { path, source })),
     };
-    let own: Vec<OwnPath> =
-        serde_json::from_str(&text).map_err(|source| Failure::scene(Unusable::States { path, source }))?;
+    let own: Vec<OwnPath> = match serde_json::from_str(&text) {
+        Ok(own) => own,
+        Err(source) => return Err(Failure::scene(Unusable::States { path, source })),
+    };
+    if own.iter().all(|one| one.gradients.is_empty()) {
+        return Err(Failure::scene(Unusable::NoSteps { path }));
+    }
+    for OwnPath { name, length, gradients } in &own {
+        let allowed = |gradient: &Tensor| determinant(gradient) > 0.0 && *length > 0.0;
+        if let Some(step) = gradients.iter().position(|gradient| !allowed(gradient)) {
+            return Err(Failure::scene(Unusable::Step { path, name: name.clone(), step: step + 1 }));
+        }
+    }
     Ok(own.into_iter().map(|one| Path::new(&one.name, one.gradients, one.length)).collect())
 }

@@ -22,12 +22,16 @@ false) ;;
 esac
 [ -z "$PROPERTIES" ] || law+=("--properties=$PROPERTIES")
 [ -z "$STATE" ] || law+=("--state=$STATE")
+[ -z "$TANGENT" ] || law+=("--tangent=$TANGENT")
 [ -z "$SOURCE" ] || law+=("--source=$SOURCE")
+while IFS= read -r option; do
+    [ -z "$option" ] || law+=("$option")
+done <<<"$OPTIONS"
 
 mkdir -p "$REPORTS"
 summary=$REPORTS/summary.md
-# A summary of an earlier step must not stand for this one.
-rm -f "$summary"
+# Reports of an earlier step must not stand for this one.
+rm -f "$summary" "$REPORTS/junit.xml" "$REPORTS/results.sarif"
 code=0
 bfree check-law "$LIBRARY" "${law[@]}" --report terminal --report github --report "markdown=$summary" \
     --report "junit=$REPORTS/junit.xml" --report "sarif=$REPORTS/results.sarif" || code=$?

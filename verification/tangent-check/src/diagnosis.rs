@@ -128,21 +128,27 @@ pub fn diagnose(convention: &Convention, observations: &[Observation]) -> Option
     if observations.iter().filter(visible).count() == 0 {
         return None;
     }
+    let general = general(convention, &observations);
     let candidates = mistakes::candidates(convention);
     let explaining: Vec<&Candidate> =
         candidates.iter().filter(|candidate| explains(candidate, convention, &observations)).collect();
     let mut diagnosis = match explaining.as_slice() {
         [] => terms::fit(convention, &observations)?,
         [one] => one.alone(),
-        several => class(several),
+        several => class(several, general),
     };
-    let general = observations.iter().filter(|observation| observation.general(convention.plane())).count();
-    if general < GENERAL_STATES {
+    if !general {
         diagnosis
             .states_that_tell
             .push("three general states: strained along no axis, rotated, with J ≠ 1".to_string());
     }
     Some(diagnosis)
+}
+
+/// Whether so many states are general that mistakes can be told apart.
+fn general(convention: &Convention, observations: &[Observation]) -> bool {
+    let plane = convention.plane();
+    observations.iter().filter(|observation| observation.general(plane)).count() >= GENERAL_STATES
 }
 
 /// Whether the mistake reproduces the claimed tangent in every state in which it can be applied, a visibly wrong one among them.
@@ -163,26 +169,28 @@ fn explains(candidate: &Candidate, convention: &Convention, observations: &[Obse
     told > 0
 }
 
-/// Several mistakes that explain the tangent equally well.
-fn class(several: &[&Candidate]) -> Diagnosis {
+/// Several mistakes that explain the tangent equally well. `general` says whether the states are general already.
+fn class(several: &[&Candidate], general: bool) -> Diagnosis {
     let candidates: Vec<String> = several.iter().map(|candidate| candidate.sentence.clone()).collect();
     let mut states_that_tell: Vec<String> = Vec::new();
     for candidate in several {
-        let states = candidate.shows_in.to_string();
+        let states = candidate.shows_in(general).to_string();
         if !states_that_tell.contains(&states) {
             states_that_tell.push(states);
         }
     }
-    let sentence = format!(
-        "{} mistakes explain your tangent equally well in these states: {}",
-        candidates.len(),
-        candidates.join(" Or: ")
-    );
+    let short = |sentence: &String| sentence.trim_start_matches(mistakes::YOURS).trim_end_matches('.').to_string();
+    let all: Vec<String> = candidates.iter().map(short).collect();
+    let sentence =
+        format!("{}one of {} that are equal in these states: {}.", mistakes::YOURS, all.len(), all.join("; or "));
     Diagnosis { sentence, candidates, states_that_tell, coefficient: None }
 }
 
-/// Mistakes that these states cannot show: with them, the tangent stays the right one. Each is the name of a mistake and the states
-/// that would show it. `None` of them if no state can be used.
+/// The mistakes of a kind that are named one by one.
+const NAMED: usize = 3;
+
+/// Mistakes that these states cannot show: with them, the tangent stays the right one. Each text names the mistakes that the same states or
+/// laws would show. Empty if no state can be used.
 pub fn invisible(convention: &Convention, observations: &[Observation]) -> Vec<String> {
     let observations = usable(convention, observations);
     let hidden = |candidate: &Candidate| {
@@ -198,8 +206,25 @@ pub fn invisible(convention: &Convention, observations: &[Observation]) -> Vec<S
         }
         applied > 0
     };
-    let sentence = |candidate: &Candidate| format!("{} (it shows in {})", candidate.name, candidate.shows_in);
-    mistakes::candidates(convention).iter().filter(|candidate| hidden(candidate)).map(sentence).collect()
+    let general = general(convention, &observations);
+    let mut kinds: Vec<(&str, Vec<String>)> = Vec::new();
+    for candidate in mistakes::candidates(convention).into_iter().filter(hidden) {
+        let shows_in = candidate.shows_in(general);
+        match kinds.iter_mut().find(|(kind, _)| *kind == shows_in) {
+            Some((_, names)) => names.push(candidate.name),
+            None => kinds.push((shows_in, vec![candidate.name])),
+        }
+    }
+    kinds.into_iter().map(|(kind, names)| format!("{}, which would need {kind}", list(&names))).collect()
+}
+
+/// The first names, and the number of the others.
+fn list(names: &[String]) -> String {
+    let first = names[..names.len().min(NAMED)].join(", ");
+    match names.len().saturating_sub(NAMED) {
+        0 => first,
+        others => format!("{first} and {others} more of the kind"),
+    }
 }
 
 /// Whether the measure is one of the rates or the small-strain tangent: symmetric stress by symmetric spatial strain.

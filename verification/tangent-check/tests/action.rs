@@ -17,12 +17,14 @@ done
 exit "$CODE"
 "#;
 
-/// Runs the check with inputs, in an empty directory. The summary of an earlier step lies there.
+/// Runs the check with inputs, in a directory with the reports of an earlier step.
 fn check(directory: &str, inputs: &[(&str, &str)], text: &str, code: u8) -> (PathBuf, Output) {
     let directory = Path::new(env!("CARGO_TARGET_TMPDIR")).join(directory);
     let _ = fs::remove_dir_all(&directory);
     fs::create_dir_all(directory.join("tangent-check")).expect("a directory");
-    fs::write(directory.join("tangent-check/summary.md"), "an earlier step\n").expect("a file");
+    for report in ["summary.md", "junit.xml", "results.sarif"] {
+        fs::write(directory.join("tangent-check").join(report), "an earlier step\n").expect("a file");
+    }
     let program = directory.join("bfree");
     fs::write(&program, BFREE).expect("a file");
     fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).expect("a program");
@@ -32,6 +34,8 @@ fn check(directory: &str, inputs: &[(&str, &str)], text: &str, code: u8) -> (Pat
         ("NAME", ""),
         ("PROPERTIES", ""),
         ("STATE", ""),
+        ("TANGENT", ""),
+        ("OPTIONS", ""),
         ("SOURCE", ""),
         ("STRICT", "false"),
         ("REPORTS", "tangent-check"),
@@ -73,6 +77,10 @@ fn inputs_become_arguments_and_never_commands() {
     assert_eq!(read(&directory, "output"), "exit-code=0\n");
     let (directory, _) = check("name", &[("INTERFACE", "mfront"), ("NAME", "Plasticity")], "text", 0);
     assert!(read(&directory, "arguments").starts_with("check-law\nlibmine.so\n--mfront\nPlasticity\n--report\n"));
+    let inputs = [("TANGENT", "strain"), ("OPTIONS", "--plane-strain\n--external=A b=1\n")];
+    let (directory, _) = check("options", &inputs, "text", 0);
+    let expected = "check-law\nlibmine.so\n--umat\n--tangent=strain\n--plane-strain\n--external=A b=1\n--report\n";
+    assert!(read(&directory, "arguments").starts_with(expected));
 }
 
 #[test]
@@ -87,6 +95,9 @@ fn failures_stay_failures() {
     assert_eq!(output.status.code(), Some(3), "no report is no success");
     assert!(String::from_utf8_lossy(&output.stdout).contains("::error title=tangent-check::"));
     assert_eq!(read(&directory, "job.md"), "", "the summary of an earlier step is not shown");
+    for report in ["summary.md", "junit.xml", "results.sarif"] {
+        assert!(!directory.join("tangent-check").join(report).exists(), "{report} is of an earlier step");
+    }
 }
 
 #[test]
@@ -109,7 +120,7 @@ fn the_script_reads_what_the_action_gives() {
     let declared: Vec<&str> = declared.into_iter().filter(|name| !name.starts_with(' ')).collect();
     let given: BTreeMap<&str, &str> =
         rest.lines().filter_map(|line| line.trim().strip_suffix(" }}")?.split_once(": ${{ inputs.")).collect();
-    assert_eq!(declared.len(), 8, "{declared:?}");
+    assert_eq!(declared.len(), 10, "{declared:?}");
     for (variable, input) in &given {
         assert!(declared.contains(input) && script.contains(&format!("${variable}")), "{variable}");
     }

@@ -14,8 +14,7 @@ pub(super) struct Candidate {
     pub name: String,
     /// A sentence about a tangent with this mistake.
     pub sentence: String,
-    /// States in which the mistake shows.
-    pub shows_in: &'static str,
+    shows_in: &'static str,
 }
 
 enum Mistake {
@@ -47,7 +46,12 @@ enum Mistake {
     Elsewhere(Elsewhere),
 }
 
+/// The beginning of all sentences.
+pub(super) const YOURS: &str = "Your tangent is ";
+
 const GENERAL: &str = "general strains along no axis";
+/// In general states, isotropic linear elasticity still hides wrong orders and factors.
+const OTHER_LAW: &str = "an anisotropic or nonlinear law";
 const STRESSED: &str = "large strain and stress";
 const VOLUME: &str = "states with J ≠ 1";
 const UNSYMMETRIC: &str = "a law whose tangent is not symmetric (flow without association)";
@@ -57,13 +61,18 @@ const ELASTIC: &str = "large elastic strain";
 
 impl Candidate {
     fn new(mistake: Mistake, name: &str, shows_in: &'static str) -> Self {
-        let sentence = format!("Your tangent is the right one with {name}.");
+        let sentence = format!("{YOURS}the right one with {name}.");
         Self { mistake, name: name.to_string(), sentence, shows_in }
     }
 
     /// A mistake whose tangent is another one: "Your tangent is {name}."
     fn other(mistake: Mistake, name: &str, shows_in: &'static str) -> Self {
-        Self { mistake, name: name.to_string(), sentence: format!("Your tangent is {name}."), shows_in }
+        Self { mistake, name: name.to_string(), sentence: format!("{YOURS}{name}."), shows_in }
+    }
+
+    /// States or laws in which the mistake shows. `general` says whether the states are general already.
+    pub(super) fn shows_in(&self, general: bool) -> &'static str {
+        if general && self.shows_in == GENERAL { OTHER_LAW } else { self.shows_in }
     }
 
     /// The diagnosis if this mistake alone explains the tangent.

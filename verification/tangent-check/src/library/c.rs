@@ -281,12 +281,14 @@ fn explained(error: &libloading::Error) -> String {
 /// Fails if the file is not a shared library for this machine. The loader's own words for that mislead: "no such file".
 fn recognise(path: &Path) -> Result<(), String> {
     let mut head = [0; 20];
-    File::open(path).and_then(|mut file| file.read_exact(&mut head)).map_err(|_| "is not a shared library.")?;
+    File::open(path)
+        .and_then(|mut file| file.read_exact(&mut head))
+        .map_err(|_| "it is not a shared library. Compile it: gfortran -shared -fPIC -o libmine.so mine.f90.")?;
     let machine = match head {
         [0x7f, b'E', b'L', b'F', bits, order, ..] => {
             let word = |at: usize| u16::from_le_bytes([head[at], head[at + 1]]);
             if order == 1 && word(16) == 1 {
-                return Err("is an object file. Link it: gfortran -shared -o libmine.so mine.o.".into());
+                return Err("it is an object file. Link it: gfortran -shared -o libmine.so mine.o.".into());
             }
             match (bits, order, word(18)) {
                 (2, 1, 62) => "x86_64".into(),
@@ -301,10 +303,12 @@ fn recognise(path: &Path) -> Result<(), String> {
         [0xcf, 0xfa, 0xed, 0xfe, 12, 0, 0, 1, ..] => "aarch64".into(),
         // Several architectures in one file of macOS: the loader chooses.
         [0xca, 0xfe, 0xba, 0xbe, ..] => return Ok(()),
-        [b'M', b'Z', ..] => return Err("is a library for Windows.".into()),
-        _ => return Err("is not a shared library.".into()),
+        [b'M', b'Z', ..] => return Err("it is a library for Windows.".into()),
+        _ => {
+            return Err("it is not a shared library. Compile it: gfortran -shared -fPIC -o libmine.so mine.f90.".into());
+        }
     };
     let here = std::env::consts::ARCH;
     let known = ["x86_64", "aarch64", "riscv64"].contains(&here);
-    if known && machine != here { Err(format!("is for {machine}, but this program is for {here}.")) } else { Ok(()) }
+    if known && machine != here { Err(format!("it is for {machine}, but this program is for {here}.")) } else { Ok(()) }
 }

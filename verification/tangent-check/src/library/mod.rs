@@ -156,7 +156,7 @@ const FULL: [(usize, usize); 9] = [(0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (1, 2
 fn failed(step: &Step, what: impl std::fmt::Display) -> CallFailed {
     let [a, b, c] = step.gradient;
     let [start, end] = [step.time, step.time + step.length];
-    CallFailed(format!("Step {} from time {start} to {end} with F = [{a:?}, {b:?}, {c:?}]: {what}", step.number))
+    CallFailed(format!("Step {} from time {start} to {end} with F = [{a:.6?}, {b:.6?}, {c:.6?}]: {what}", step.number))
 }
 
 /// The name of a component for sentences: "12".

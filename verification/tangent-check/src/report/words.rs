@@ -150,11 +150,15 @@ pub(super) fn finding(report: &Report, finding: &Finding) -> String {
 /// A diagnosis in sentences, with the mistakes that look the same and the states that tell them apart.
 pub(super) fn diagnosis(diagnosis: &Diagnosis) -> String {
     let mut text = diagnosis.sentence.clone();
-    if diagnosis.candidates.len() > 1 {
+    let told = diagnosis
+        .candidates
+        .iter()
+        .all(|one| text.contains(one.trim_start_matches("Your tangent is ").trim_end_matches('.')));
+    if diagnosis.candidates.len() > 1 && !told {
         text += &format!(" These mistakes look the same in the states tried: {}.", diagnosis.candidates.join("; "));
     }
     if !diagnosis.states_that_tell.is_empty() {
-        text += &format!(" States that tell them apart: {}.", diagnosis.states_that_tell.join("; "));
+        text += &format!(" States that may tell them apart: {}.", diagnosis.states_that_tell.join("; "));
     }
     text
 }

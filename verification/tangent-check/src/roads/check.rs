@@ -1,7 +1,7 @@
 //! The check of a law along paths.
 
 use super::{History, Input, Perturbed, Road, inputs_read, probe, roads};
-use crate::convention::{Configuration, Convention, cauchy_stress};
+use crate::convention::{Configuration, Convention, Measure, cauchy_stress};
 use crate::diagnosis::{Elsewhere, Measured, Observation, diagnose, invisible};
 use crate::finding::{Finding, Reason, Report, Verdict};
 use crate::judge::{Loading, check_along};
@@ -111,6 +111,9 @@ fn report(law: &mut dyn Law, paths: &[Path], seed: u64, check: &mut Check) -> Re
     report.notes.extend(note_of_roads(&travelled));
     if let Some(chosen) = travelled.into_iter().min_by_key(Travelled::wrong) {
         diagnose_into(law, &visits, &chosen, &mut report);
+        if chosen.wrong() > 0 {
+            report.notes.extend(note_of_meaning(&read, convention.measure));
+        }
         report.findings.extend(chosen.findings);
     }
     report
@@ -204,6 +207,15 @@ fn note_of_inputs(read: &[Input]) -> String {
     }
 }
 
+/// A law of the strain increment whose claimed rate is wrong may mean another tangent.
+fn note_of_meaning(read: &[Input], measure: Measure) -> Option<String> {
+    let small = read.contains(&Input::StrainIncrement) && !read.contains(&Input::Gradient);
+    let rate = matches!(measure, Measure::JaumannKirchhoff | Measure::JaumannCauchy);
+    let text = "The law reads the strain increment and not F. If it was written for small strain, its tangent means ∂σ/∂Δε: check it with this \
+                meaning (bfree check-law: --tangent strain).";
+    (small && rate).then(|| text.to_string())
+}
+
 fn note_of_roads(travelled: &[Travelled]) -> Option<String> {
     let [gradient, strain] = travelled else {
         return None;
@@ -231,7 +243,7 @@ fn diagnose_into(law: &mut dyn Law, visits: &[Visit], travelled: &Travelled, rep
     let observations = observations(law, visits, travelled);
     let hidden = invisible(&convention, &observations);
     if !hidden.is_empty() {
-        report.notes.push(format!("These states cannot show: {}.", hidden.join("; ")));
+        report.notes.push(format!("Mistakes that this check cannot show: {}.", hidden.join("; ")));
     }
     if travelled.wrong() == 0 {
         return;
