@@ -25,7 +25,7 @@ pub(crate) const LARGEST: f64 = 1e100;
 pub struct Problem {
     /// The key, such as `bodies[0].density`; empty if the text is not JSON.
     pub path: String,
-    /// What is wrong, such as `-1 is not allowed; must be finite and > 0`.
+    /// The sentence about the wrong value, such as `-1 is not allowed; must be finite and > 0`.
     pub message: String,
     /// The place of the value; unknown for keys that are absent.
     pub place: Option<Place>,

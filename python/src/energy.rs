@@ -45,7 +45,7 @@ enum Operation {
 
 type Tape = Arc<Mutex<Vec<Operation>>>;
 
-/// What a thread that panicked left is as good as before: a list that only grows.
+/// The list after a panic of another thread: it only grows, so it is as good as before.
 fn held(tape: &Tape) -> MutexGuard<'_, Vec<Operation>> {
     tape.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -232,7 +232,7 @@ fn explained(py: Python<'_>, error: PyErr) -> PyErr {
     clear
 }
 
-/// What an energy does to its strain.
+/// The operations of an energy on its strain.
 #[derive(Clone, Debug)]
 pub struct Recorded {
     operations: Arc<[Operation]>,

@@ -45,7 +45,7 @@ impl Law {
         Ok(Self { law })
     }
 
-    /// What the checks of laws say: rows of quantity, dimension, regime, value and bound.
+    /// The results of the checks of laws: rows of quantity, dimension, regime, value and bound.
     fn check(&self, py: Python<'_>) -> String {
         py.detach(|| check_material(&self.law)).to_string()
     }

@@ -29,7 +29,7 @@ create_exception!(
     "A step that failed; the simulation is as after the last good one."
 );
 
-/// What an error and its causes say, a line each.
+/// The messages of an error and its causes, a line each.
 fn chain(error: &dyn Error) -> String {
     ::bfree::causes::messages(error).join("\n  because: ")
 }

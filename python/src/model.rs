@@ -10,7 +10,7 @@ use bfree::simulation::{AdvanceError, Simulation, StepError};
 use bfree::solver::Stop;
 use std::sync::Arc;
 
-/// What Python asks of a simulation.
+/// The functions of a simulation that Python calls.
 pub trait Model: Send + Sync {
     fn dimension(&self) -> usize;
     fn clock(&self) -> &Clock;

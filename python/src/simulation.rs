@@ -22,10 +22,10 @@ pub struct Simulation {
     /// Names of the bodies.
     #[pyo3(get)]
     bodies: Vec<String>,
-    /// What a step requires.
+    /// The plan of a step, as text.
     #[pyo3(get)]
     plan: String,
-    /// What has been asked of the present state.
+    /// Results that are kept until the state changes.
     arrays: HashMap<Field, Py<PyAny>>,
     coming: Option<Arc<dyn System>>,
 }

@@ -1,4 +1,4 @@
-//! What a step did.
+//! The report of a step.
 
 use crate::arrays::frozen;
 use bfree::mechanics::loads::Prescribed;
@@ -6,7 +6,7 @@ use bfree::simulation::StepReport;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// What a step did.
+/// The report of a step.
 #[pyclass(frozen, module = "bfree")]
 pub struct Step {
     /// t at its end.

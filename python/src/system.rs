@@ -1,4 +1,4 @@
-//! What the coming step solves: R(Δφ) and its derivative K.
+//! The equations of the next step: R(Δφ) and its derivative K.
 
 use crate::arrays::{frozen, numbers};
 use crate::law::BodyLaw;

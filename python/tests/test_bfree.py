@@ -1,4 +1,4 @@
-"""What bfree promises from Python, against known answers and against itself."""
+"""The promises of bfree in Python, against known answers and against itself."""
 
 import ast
 import collections

@@ -20,6 +20,8 @@ use std::any::TypeId;
 use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use tangent_check::convention::{self, Components, Configuration, Convention, ConversionFailed, Measure};
+use tangent_check::finding::{Entry, Verdict};
+use tangent_check::judge::check_columns;
 use tangent_check::law::{CallFailed, Response, Step};
 use tangent_check::library::{Caller, Description, Signature, empty_response, open};
 use tangent_check::matrix::Matrix;
@@ -329,6 +331,33 @@ impl Law for Foreign {
 
     fn has_potential(&self) -> bool {
         false
+    }
+
+    /// ∂P/∂F = δF S + F [ℂ : sym(Fᵀ δF)] with the claimed ℂ, column by column, against differences of P = F S.
+    fn check_claim<const D: usize>(&self, at: &MaterialState<f64, D>) -> Result<(), String> {
+        let unit = |index: usize| (index / D, index % D);
+        let delta = |column: usize| Tensor::<f64, D>::from_fn(|i, k| f64::from((i, k) == unit(column)));
+        let rows = |piola: &Tensor<f64, D>| (0..D * D).map(|index| piola[unit(index)]).collect::<Vec<f64>>();
+        let (stress, moduli) = (self.stress(at), self.moduli(at));
+        let mut claimed = Matrix::zeros(D * D, D * D);
+        for column in 0..D * D {
+            let strain = embed(&symmetric(&(at.f.transpose() * delta(column))));
+            let change = delta(column) * stress + at.f * cut::<f64, D>(&self.calls.contract(&moduli, &strain));
+            rows(&change).iter().enumerate().for_each(|(row, x)| claimed[(row, column)] = *x);
+        }
+        let mut perturbed = |column: usize, h: f64| {
+            let moved = at.deformed(at.h + delta(column) * h).admissible();
+            let moved = moved.map_err(|error| CallFailed(error.to_string()))?;
+            Ok(rows(&(moved.f * self.stress(&moved))))
+        };
+        let finding = check_columns("", &claimed, &rows(&(at.f * stress)), &mut perturbed);
+        let Some(Entry { row, column, claimed, measured, error }) =
+            finding.worst.filter(|_| finding.verdict == Verdict::Wrong)
+        else {
+            return Ok(());
+        };
+        let name = |index: usize| format!("{}{}", unit(index).0 + 1, unit(index).1 + 1);
+        Err(format!("∂P{}/∂F{}: claimed {claimed:e}, measured {measured:e} ± {error:.0e}", name(row), name(column)))
     }
 
     fn last_failure(&self) -> Option<String> {

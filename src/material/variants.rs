@@ -82,6 +82,9 @@ macro_rules! law_of_variants {
         fn has_potential(&self) -> bool {
             match self { $(Self::$variant(law) => $crate::material::Law::has_potential(law)),+ }
         }
+        fn check_claim<const D: usize>(&self, at: &$crate::material::MaterialState<f64, D>) -> Result<(), String> {
+            match self { $(Self::$variant(law) => $crate::material::Law::check_claim(law, at)),+ }
+        }
         fn last_failure(&self) -> Option<String> {
             match self { $(Self::$variant(law) => $crate::material::Law::last_failure(law)),+ }
         }

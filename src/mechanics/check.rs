@@ -54,6 +54,17 @@ pub enum CheckError {
     /// The tangent is wrong.
     #[error(transparent)]
     Mismatch(#[from] TangentMismatch),
+    /// The tangent that a law from a shared library claims is not the derivative of its stress.
+    #[error(
+        "the law of particle {particle} claims a tangent that is not the derivative of its stress in this step: {sentence}; check the law \
+         (bfree check-law), also whether its stress turns with the body"
+    )]
+    Claim {
+        /// Id of the particle.
+        particle: usize,
+        /// The component that is wrong.
+        sentence: String,
+    },
     /// The state cannot be evaluated.
     #[error(transparent)]
     Inadmissible(#[from] Inadmissible),
@@ -81,7 +92,7 @@ pub fn direction<const D: usize>(nodes: usize, seed: u64) -> Vec<Vector<f64, D>>
 impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     /// Compares the tangent at Δφ in the direction `u`, each piece and the whole, with dual numbers through the same transfer loop. The
     /// tangent acts through the products that the solver applies. Then the diagonal blocks of the preconditioner are compared with the
-    /// product.
+    /// product. Laws from shared libraries compare their claims with differences, at a few particles.
     ///
     /// ```
     /// use bfree::mechanics::{check::{CheckError, direction}, sweep::Supports, transfer::Nodal};
@@ -108,6 +119,7 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
         self.unknowns.clear_prescribed(&mut u);
         let dphi = &*self.unknowns.extended(dphi);
         let bound = self.worst_bound(dphi)?;
+        self.check_claims(dphi)?;
         let product = |tangent: &Tangent<'_, D>| {
             let mut out = vec![Vector::zeros(); u.len()];
             tangent.product(&u, &mut out);
@@ -133,6 +145,19 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
         let tangent = self.tangent(dphi)?;
         compare("whole product", &product(&tangent), &whole, bound, norm(&whole))?;
         self.check_blocks(&tangent, bound)
+    }
+
+    /// Lets the laws of a few particles compare what they claim with differences.
+    fn check_claims(&self, dphi: &[Vector<f64, D>]) -> Result<(), CheckError> {
+        let (particles, supports) = (self.step.particles, self.step.supports);
+        for p in (0..particles.len()).step_by(particles.len().div_ceil(CLAIMS).max(1)) {
+            let h_r = &particles.reference().displacement_gradient[p];
+            let at = particles.state(p, self.step.dt).deformed(compose(&supports.gradient_at(p, dphi), h_r));
+            let law = &self.step.bodies[particles.body[p] as usize].law;
+            let particle = particles.id[p] as usize;
+            law.check_claim(&at).map_err(|sentence| CheckError::Claim { particle, sentence })?;
+        }
+        Ok(())
     }
 
     /// The largest [`tangent_bound`] of all particles.
@@ -182,6 +207,9 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
         Ok(())
     }
 }
+
+/// Number of particles whose laws compare what they claim.
+const CLAIMS: usize = 16;
 
 /// Number of nodes whose blocks are compared, and of inner nodes with followers that are compared in addition.
 const BLOCKS: usize = 4;

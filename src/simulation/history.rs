@@ -14,7 +14,7 @@ use crate::tensor::Vector;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-/// What the next step takes from earlier steps, beside the particles. A simulation writes it; see [`Simulation::forget`].
+/// The state that the next step takes from earlier steps, beside the particles. A simulation writes it; see [`Simulation::forget`].
 #[derive(Clone, Debug, Default)]
 pub struct History<const D: usize> {
     /// The nodal state; `None` if the next step resets the grid.

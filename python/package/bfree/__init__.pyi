@@ -65,7 +65,7 @@ class Simulation(Iterator[Step]):
 
     @property
     def plan(self) -> str:
-        """What a step requires, as `bfree check` prints it."""
+        """The plan of a step, as `bfree check` prints it."""
 
     @property
     def dimension(self) -> int:
@@ -220,7 +220,7 @@ class Particles:
 
 @final
 class Step:
-    """What a step did."""
+    """The report of a step."""
 
     @property
     def time(self) -> float:
@@ -285,7 +285,7 @@ class Number:
 
 @final
 class Tangent:
-    """What the operators of `Simulation.tangent` apply."""
+    """The linearised tangent that the operators of `Simulation.tangent` apply."""
 
 def det(a: Any) -> Any:
     """The determinant of a 3×3 array, recorded strains too."""

@@ -102,7 +102,7 @@ pub fn check_law_in_library(
     conclude(report, law.raised)
 }
 
-/// What the child runs.
+/// The Python code that the child process runs.
 #[pyfunction]
 pub fn serve_law(py: Python<'_>) -> PyResult<()> {
     py.detach(serve).map_err(|error| PyOSError::new_err(format!("this is for child processes alone: {error}")))

@@ -14,7 +14,7 @@ use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
 use tangent_check::law::CallFailed;
 
-/// What a user's functions raised.
+/// The exception that a user's function raised.
 #[derive(Default)]
 pub struct Raised {
     /// The first exception: it became a finding.

@@ -55,7 +55,7 @@ impl Report {
         self.report.exit_code(false) == 0
     }
 
-    /// What was checked.
+    /// The name of the state or term.
     #[getter]
     fn subject(&self) -> &str {
         &self.report.subject

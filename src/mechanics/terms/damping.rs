@@ -2,8 +2,8 @@
 //! rotations.
 
 use super::inertia::LinearizedMass;
-use super::stress::LinearizedStress;
-use super::{Linearized, LinearizedTerm, Role, Step, Stress, Sum, Term, summed};
+use super::stress::{LinearizedStress, Stress};
+use super::term::{Linearized, LinearizedTerm, Role, Step, Sum, Term, summed};
 use crate::material::Law;
 use crate::mechanics::constitutive::{Inadmissible, Part};
 use crate::mechanics::loads::Rayleigh;

@@ -1,6 +1,6 @@
 //! Dead loads, constant forces f on the nodes: the terms −f, with the energies −f·Δφ and without tangents.
 
-use super::{Role, Step, Sum, Term, summed};
+use super::term::{Role, Step, Sum, Term, summed};
 use crate::mechanics::constitutive::Inadmissible;
 use crate::mechanics::loads::{ForceField, Pressing};
 use crate::mechanics::sweep::Number;

@@ -1,6 +1,6 @@
 //! Inertia, M̃ a with a = α₁ (Δφ − Δφ̂): eq. 33 with the sign corrected.
 
-use super::{AtPoints, BlocksAtPoints, Linearized, LinearizedTerm, ProductAtPoints, Step, Sum, Term, summed};
+use super::term::{AtPoints, BlocksAtPoints, Linearized, LinearizedTerm, ProductAtPoints, Step, Sum, Term, summed};
 use crate::mechanics::constitutive::{Inadmissible, Part};
 use crate::mechanics::mass::Mass;
 use crate::mechanics::schemes::Alphas;

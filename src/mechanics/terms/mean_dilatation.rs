@@ -14,7 +14,7 @@
 //!
 //! The first part of δσ couples the particles of a cell; the second has the form of a [`ClosedTangent`](crate::material::ClosedTangent).
 
-use super::{
+use super::term::{
     AtPoints, BlocksAtPoints, FunctionsAt, Linearized, LinearizedTerm, ProductAtPoints, Step, Sum, Term, summed,
 };
 use crate::lanes::LANES;

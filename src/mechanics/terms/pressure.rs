@@ -1,6 +1,6 @@
 //! Follower pressure, +p cof(F) N A on the particles of a surface. The tangent is exact, and not symmetric on an open surface.
 
-use super::{FunctionsAt, Linearized, LinearizedTerm, Role, Step, Sum, Term};
+use super::term::{FunctionsAt, Linearized, LinearizedTerm, Role, Step, Sum, Term};
 use crate::mechanics::constitutive::{Inadmissible, Part, compose};
 use crate::mechanics::loads::PressurePoint;
 use crate::mechanics::sweep::{Number, Supports};

@@ -1,6 +1,6 @@
 //! The internal force Σ_p V₀ F S ∇N (eq. 17), and its tangent, geometric and material (eqs. 34, 38).
 
-use super::{AtPoints, BlocksAtPoints, Linearized, LinearizedTerm, ProductAtPoints, Step, Sum, Term, summed};
+use super::term::{AtPoints, BlocksAtPoints, Linearized, LinearizedTerm, ProductAtPoints, Step, Sum, Term, summed};
 use crate::lanes::LANES;
 use crate::material::Law;
 use crate::mechanics::constitutive::{AddTo, Form, Laws, Product, add_quadratic, product};

@@ -84,7 +84,7 @@ impl Solution {
     pub fn orders(&self) -> Vec<Option<f64>> {
         let floor = self.floor();
         let order = |three: &[f64]| {
-            let (before, now) = (three[1] / three[0], three[2].max(floor) / three[1]);
+            let (before, now) = (three[1] / three[0], three[2].max(f64::MIN_POSITIVE) / three[1]);
             let falls = three[1] > floor && before <= CONVERGES && now < 1.0;
             let order = now.ln() / before.ln();
             (falls && (three[2] > floor || order >= QUADRATIC)).then_some(order)

@@ -5,108 +5,18 @@
 //! form a class. If no mistake of the list explains it, a single additional term with one coefficient is fitted.
 
 mod mistakes;
+mod observation;
 mod terms;
 
-use crate::convention::{Configuration, Convention, Measure};
-use crate::finding::Diagnosis;
-use crate::matrix::Matrix;
-use crate::tensor::{IDENTITY, determinant, norm, polar, product, sum, transposed};
-use mistakes::Candidate;
+pub use observation::{Elsewhere, Measured, Observation};
 
-/// A candidate agrees within this many errors of the measurement.
-const AGREEMENT: f64 = 60.0;
-/// A deviation that is to be explained exceeds this many errors somewhere; below it, every small change would explain it.
-const VISIBLE: f64 = 600.0;
-/// Measured tangents with greater errors than this, relative to their greatest entry, take no part.
-const USABLE: f64 = 1e-6;
+use crate::convention::Convention;
+use crate::finding::Diagnosis;
+use mistakes::Candidate;
+use observation::{AGREEMENT, VISIBLE, distance};
+
 /// So many general states are needed to tell mistakes apart.
 const GENERAL_STATES: usize = 3;
-
-/// A tangent of the same law elsewhere, which may stand in place of the right one by mistake.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Elsewhere {
-    /// At the end of the step before.
-    StepBefore,
-    /// In the same state without plastic or viscous flow.
-    Elastic,
-    /// In the same state, with flow in a step of length zero.
-    Continuum,
-    /// At rest, without strain.
-    AtRest,
-}
-
-/// A measured tangent.
-#[derive(Clone, Debug)]
-pub struct Measured {
-    /// The entries.
-    pub tangent: Matrix,
-    /// The estimated error of each.
-    pub errors: Matrix,
-}
-
-/// A checked state.
-#[derive(Clone, Debug)]
-pub struct Observation {
-    /// The name of the state.
-    pub name: String,
-    /// F₀, F₁ and the Cauchy stress.
-    pub at: Configuration,
-    /// The tangent as claimed.
-    pub claimed: Matrix,
-    /// The right tangent, by differences.
-    pub measured: Measured,
-    /// Right tangents of the same law elsewhere, where they were measured.
-    pub elsewhere: Vec<(Elsewhere, Measured)>,
-}
-
-impl Measured {
-    /// The greatest error; infinite if an entry or error is not finite or there is none.
-    fn error(&self) -> f64 {
-        let entries = &self.tangent.entries;
-        let finite = entries.iter().chain(&self.errors.entries).all(|entry| entry.is_finite());
-        if !finite || entries.is_empty() || self.errors.entries.len() != entries.len() {
-            return f64::INFINITY;
-        }
-        // The measurement is no better than the rounding of its greatest entry.
-        self.errors.greatest().max(f64::EPSILON * self.tangent.greatest())
-    }
-}
-
-impl Observation {
-    /// The tangent of this law elsewhere.
-    fn elsewhere(&self, kind: Elsewhere) -> Option<&Measured> {
-        self.elsewhere.iter().find(|(found, _)| *found == kind).map(|(_, measured)| measured)
-    }
-
-    /// Whether claimed and measured tangents fit the convention and are accurate enough to tell mistakes.
-    fn usable(&self, convention: &Convention) -> bool {
-        let size = |matrix: &Matrix| {
-            let [rows, columns] = [convention.stress.count(), convention.strain.count()];
-            (matrix.rows, matrix.columns, matrix.entries.len()) == (rows, columns, rows * columns)
-        };
-        size(&self.claimed)
-            && size(&self.measured.tangent)
-            && self.claimed.entries.iter().all(|entry| entry.is_finite())
-            && self.measured.error() <= USABLE * self.measured.tangent.greatest()
-            && self.measured.tangent.greatest() > 0.0
-    }
-
-    /// Whether F is rotated, J is not 1, and no axis of strain is aligned.
-    fn general(&self, plane: bool) -> bool {
-        let stretch = product(&self.at.gradient, &transposed(&self.at.gradient));
-        let shears = [stretch[0][1], stretch[0][2], stretch[1][2]];
-        let sheared = shears.iter().take(if plane { 1 } else { 3 }).all(|shear| shear.abs() > 1e-3);
-        let turned = |(rotation, _)| norm(&sum(&rotation, -1.0, &IDENTITY)) > 1e-2;
-        let volume = (determinant(&self.at.gradient) - 1.0).abs() > 1e-3;
-        sheared && volume && polar(&self.at.gradient).is_some_and(turned)
-    }
-}
-
-/// The greatest |A − B|; infinite if an entry is not finite.
-fn distance(a: &Matrix, b: &Matrix) -> f64 {
-    let distance = |(a, b): (&f64, &f64)| if (a - b).is_finite() { (a - b).abs() } else { f64::INFINITY };
-    a.entries.iter().zip(&b.entries).map(distance).fold(0.0, f64::max)
-}
 
 /// The observations that take part in a diagnosis.
 /// Increments have no part in mistakes of algebra: ∂σ/∂Δε stands beside the Jaumann rate of the Cauchy stress, as for small increments.
@@ -225,9 +135,4 @@ fn list(names: &[String]) -> String {
         0 => first,
         others => format!("{first} and {others} more of the kind"),
     }
-}
-
-/// Whether the measure is one of the rates or the small-strain tangent: symmetric stress by symmetric spatial strain.
-fn spatial(measure: Measure) -> bool {
-    !measure.by_gradient() && measure != Measure::SecondPiolaByGreen
 }

@@ -25,9 +25,12 @@
 //!   to the surface, both sides cross it, and all three estimates agree on the wrong derivative.
 //! - Tables of noise that do not set aside smooth functions mistake the curvature near an apex for noise of 1e-9.
 
+mod estimate;
 mod noise;
 mod tableau;
 
+pub(crate) use estimate::ERRORS;
+pub use estimate::Estimate;
 pub use noise::noise;
 
 use crate::law::CallFailed;
@@ -50,9 +53,6 @@ const NEAR: f64 = 100.0;
 
 /// The perturbation, over h₀, of the last look: near √ε for h₀ = 0.04.
 const END: f64 = 5e-7;
-
-/// Derivatives that differ by more than this number of errors differ.
-pub(crate) const ERRORS: f64 = 10.0;
 
 /// The perturbations h_i = h₀ r⁻ⁱ.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -94,33 +94,6 @@ impl Ladder {
             "The ladder of perturbations starts at {first}, with ratio {ratio} and {levels} levels. The start must be positive, the ratio \
              greater than 1, and there must be levels."
         )))
-    }
-}
-
-/// A measured derivative with the error of each component.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Estimate {
-    /// The derivative; NaN where it could not be measured.
-    pub value: Vec<f64>,
-    /// The estimated error; infinite where the derivative could not be measured.
-    pub error: Vec<f64>,
-}
-
-impl Estimate {
-    /// No measurement of `size` components.
-    pub(crate) fn none(size: usize) -> Self {
-        Self { value: vec![f64::NAN; size], error: vec![f64::INFINITY; size] }
-    }
-
-    /// The greatest error.
-    pub fn greatest_error(&self) -> f64 {
-        self.error.iter().fold(0.0, |greatest, error| greatest.max(*error))
-    }
-
-    /// Whether a component differs from that of `other` by more than ten of the errors of both.
-    fn disagrees(&self, other: &Self) -> bool {
-        let components = self.value.iter().zip(&self.error).zip(other.value.iter().zip(&other.error));
-        components.into_iter().any(|((a, e), (b, f))| (a - b).abs() > ERRORS * (e + f))
     }
 }
 

@@ -47,6 +47,13 @@ pub struct Entry {
     pub error: f64,
 }
 
+impl Entry {
+    /// |claimed − measured|.
+    pub fn deviation(&self) -> f64 {
+        (self.claimed - self.measured).abs()
+    }
+}
+
 /// The check of one tangent in one state.
 #[derive(Clone, Debug)]
 pub struct Finding {
@@ -104,7 +111,7 @@ pub struct Report {
     pub seed: u64,
     /// The checks.
     pub findings: Vec<Finding>,
-    /// What explains the wrong ones; empty if nothing does.
+    /// The mistakes that explain the wrong ones; empty if none does.
     pub diagnoses: Vec<Diagnosis>,
     /// Sentences for the reader: inputs that the law reads, mistakes that these states cannot show.
     pub notes: Vec<String>,

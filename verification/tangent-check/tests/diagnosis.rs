@@ -3,7 +3,7 @@
 //! By default each mistake is planted in one law, and each law has several. This command plants each mistake in each law, and prints
 //! the table; it takes half a minute:
 //!
-//! `cargo test --release -p tangent-check --test diagnosis -- --ignored --nocapture`
+//! `ALL_LAWS=1 cargo test --release -p tangent-check --test diagnosis -- --nocapture`
 
 mod laws;
 
@@ -174,19 +174,17 @@ fn tables(chosen: impl Fn(usize, usize) -> bool) -> [usize; 4] {
     total
 }
 
+/// Each mistake in the law that shows it; with `ALL_LAWS=1` in the environment each mistake in each law, in half a minute.
 #[test]
 fn planted_mistakes_are_named() {
-    let [named, _, _, misnamed] = tables(|law, by| law == by);
+    let all = std::env::var_os("ALL_LAWS").is_some();
+    let [named, unnamed, _, misnamed] = tables(|law, by| all || law == by);
     assert_eq!(misnamed, 0);
-    assert_eq!(named, listed().len());
-}
-
-#[test]
-#[ignore = "takes half a minute"]
-fn all_planted_mistakes_are_named() {
-    let [named, unnamed, _, misnamed] = tables(|_, _| true);
-    assert_eq!(misnamed, 0);
-    assert!(named as f64 >= 0.8 * (named + unnamed) as f64);
+    if all {
+        assert!(named as f64 >= 0.8 * (named + unnamed) as f64);
+    } else {
+        assert_eq!(named, listed().len());
+    }
 }
 
 #[test]
@@ -291,7 +289,8 @@ fn a_law_of_strain_and_gradient_is_checked_on_both_roads() {
     assert_eq!(report.verdict(), Verdict::Consistent, "{:?}", report.notes);
     assert!(report.notes[0].contains("DSTRAN") && report.notes[0].contains("DFGRD1"), "{}", report.notes[0]);
     let roads = "8 of 8 states are wrong through F, 0 of 8 states are wrong through the strain increment";
-    assert!(report.notes[1].contains(roads), "{}", report.notes[1]);
+    assert!(report.notes[1].contains("not objective"), "{}", report.notes[1]);
+    assert!(report.notes[2].contains(roads), "{}", report.notes[2]);
 }
 
 #[test]

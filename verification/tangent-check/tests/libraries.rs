@@ -492,7 +492,7 @@ fn faults() {
     }
 }
 
-/// What a library prints goes to the standard error. This test starts itself, to read both.
+/// The prints of a library go to the standard error. This test starts itself, to read both.
 #[test]
 fn prints() {
     const INNER: &str = "TANGENT_CHECK_PRINTS";
@@ -565,7 +565,7 @@ fn start_fails(description: Description, sentence: &str) {
     assert!(said.contains(sentence), "{said}");
 }
 
-/// What cannot be loaded says why, in the child and in this program.
+/// A file that cannot be loaded has an error that says why, in the child and in this program.
 #[test]
 fn loading_fails() {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));

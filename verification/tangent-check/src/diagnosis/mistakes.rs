@@ -1,6 +1,6 @@
 //! The list of frequent mistakes. Each turns a right tangent into a wrong one.
 
-use super::{Elsewhere, Measured, Observation, spatial};
+use super::observation::{Elsewhere, Measured, Observation, spatial};
 use crate::convention::{Components, Convention, Measure};
 use crate::finding::Diagnosis;
 use crate::matrix::Matrix;

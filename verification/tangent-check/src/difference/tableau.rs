@@ -1,6 +1,6 @@
 //! Ridders' tableau: Richardson's extrapolation with an error.
 
-use super::Estimate;
+use super::estimate::Estimate;
 
 /// An entry has at least this part of the greatest error of its column: a small difference in one entry may be luck.
 const SHARE: f64 = 0.1;

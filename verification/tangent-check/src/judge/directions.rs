@@ -2,7 +2,7 @@
 
 use super::check::{Loading, explained, measure};
 use super::{Entry, Finding, Matrix, Measured, Verdict, failed, greatest, judge};
-use crate::difference::{Ladder, derivative};
+use crate::difference::{ERRORS, Ladder, derivative};
 use crate::law::CallFailed;
 
 /// The directions of a check.
@@ -124,7 +124,7 @@ fn locate(
 }
 
 fn deviates(entry: &Entry) -> bool {
-    entry.deviation() > super::ERRORS * entry.error + 1e3 * f64::EPSILON * greatest(&[entry.claimed, entry.measured])
+    entry.deviation() > ERRORS * entry.error + 1e3 * f64::EPSILON * greatest(&[entry.claimed, entry.measured])
 }
 
 /// SplitMix64 (Steele, Lea and Flood 2014).

@@ -1,6 +1,10 @@
-//! What the measurements say about one column of a claimed tangent.
+//! The evidence of the measurements about one column of a claimed tangent.
 
-use super::{Derivative, ERRORS, Entry, Estimate, Matrix, Measured, NOISY, greatest, loose};
+use super::loose;
+use super::measured::{Measured, NOISY, column, greatest};
+use crate::difference::{Derivative, ERRORS, Estimate};
+use crate::finding::Entry;
+use crate::matrix::Matrix;
 
 /// The round-off of a claimed tangent over ‖C‖, in units of ε.
 const ROUND_OFF: f64 = 4.0;
@@ -62,9 +66,9 @@ impl Evidence {
     pub fn exact(exact: &Matrix, bound: f64) -> Self {
         let scale = exact.greatest();
         let error = vec![bound * scale; exact.rows];
-        let column = |k| Estimate { value: super::column(exact, k), error: error.clone() };
+        let estimate = |k| Estimate { value: column(exact, k), error: error.clone() };
         let columns = (0..exact.columns)
-            .map(|k| Column { accepted: vec![column(k)], sides: vec![], kink: false, contradicted: false })
+            .map(|k| Column { accepted: vec![estimate(k)], sides: vec![], kink: false, contradicted: false })
             .collect();
         Self { columns, scale, errors: 1.0, explained: 0.0 }
     }
@@ -120,7 +124,7 @@ impl Evidence {
     /// Whether the claimed and the measured tangent are zero within the errors.
     pub fn is_zero(&self, claimed: &Matrix) -> bool {
         (0..claimed.columns).all(|k| {
-            let nearest = self.nearest(k, &super::column(claimed, k));
+            let nearest = self.nearest(k, &column(claimed, k));
             (0..claimed.rows).all(|i| {
                 let small = |value: f64| value.abs() <= self.errors * nearest.error[i];
                 small(nearest.value[i]) && small(claimed[(i, k)])
@@ -130,7 +134,7 @@ impl Evidence {
 
     /// The greatest deviation in column `k`.
     pub fn deviation(&self, k: usize, claimed: &Matrix) -> f64 {
-        let column = super::column(claimed, k);
+        let column = column(claimed, k);
         let nearest = self.nearest(k, &column);
         greatest(&column.iter().zip(&nearest.value).map(|(c, d)| c - d).collect::<Vec<f64>>())
     }

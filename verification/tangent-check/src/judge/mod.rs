@@ -5,33 +5,18 @@ mod control;
 mod directions;
 mod evidence;
 mod loose;
+mod measured;
 
 pub use check::{Loading, check_along, check_columns, check_columns_on, measure};
 pub use directions::{Directions, Product, Residual, check_directions};
 pub use loose::Jump;
+pub use measured::Measured;
 
-use crate::difference::{Derivative, ERRORS, Estimate};
+use crate::difference::{ERRORS, Estimate};
 use crate::finding::{Entry, Finding, Reason, Verdict};
 use crate::matrix::Matrix;
 use evidence::{ColumnVerdict, Evidence};
-
-/// The greatest error of the differences, over ‖C‖, with which a tangent counts as checked.
-const NOISY: f64 = 1e-6;
-
-/// All that was measured of a function in one state.
-#[derive(Clone, Debug)]
-pub struct Measured {
-    /// The response.
-    pub value: Vec<f64>,
-    /// The noise of each component of the response.
-    pub noise: Vec<f64>,
-    /// The derivatives, one a column.
-    pub columns: Vec<Derivative>,
-    /// A jump of the response, if one was found: the trace of a local iteration that stops early.
-    pub jump: Option<Jump>,
-    /// Calls of the function.
-    pub calls: usize,
-}
+use measured::{NOISY, column, greatest};
 
 /// Compares a claimed tangent with the measured derivatives, whose norm ‖C‖ is the greatest entry.
 ///
@@ -123,8 +108,11 @@ fn failed(name: &str, claimed: &Matrix, rows: usize, columns: usize, sentence: S
 
 /// The sentence over a tangent that cannot be compared.
 fn fault(claimed: &Matrix, rows: usize, columns: usize, measured: bool) -> Option<String> {
-    if claimed.rows != rows || claimed.columns != columns || claimed.entries.len() != rows * columns {
-        let (has_rows, has_columns) = (claimed.rows, claimed.columns);
+    let (has_rows, has_columns, entries) = (claimed.rows, claimed.columns, claimed.entries.len());
+    if entries != has_rows * has_columns {
+        return Some(format!("The claimed tangent has {entries} entries, which are not {has_rows} × {has_columns}."));
+    }
+    if has_rows != rows || has_columns != columns {
         return Some(format!(
             "The claimed tangent has {has_rows} × {has_columns} entries, but the response asks for {rows} × {columns}."
         ));
@@ -192,21 +180,6 @@ fn describe(finding: &mut Finding, evidence: &Evidence) {
     let scale = evidence.scale_for(&finding.claimed);
     finding.deviation = worst.map_or(f64::NAN, |(entry, _)| relative(entry.deviation(), scale));
     finding.error = relative(finding.errors.greatest(), scale);
-}
-
-impl Entry {
-    /// |claimed − measured|.
-    pub fn deviation(&self) -> f64 {
-        (self.claimed - self.measured).abs()
-    }
-}
-
-fn column(matrix: &Matrix, k: usize) -> Vec<f64> {
-    (0..matrix.rows).map(|i| matrix[(i, k)]).collect()
-}
-
-fn greatest(values: &[f64]) -> f64 {
-    values.iter().fold(0.0, |greatest, value| greatest.max(value.abs()))
 }
 
 /// `part` over `whole`; `part` itself if `whole` is zero.

@@ -1,7 +1,8 @@
 //! Annotations of GitHub Actions: workflow commands, `::error file=…,title=…::message`.
 
+use super::options::Options;
 use super::severity::{Severity, failure_of_the_whole, worst_first};
-use super::{Options, words};
+use super::words;
 use crate::finding::{Finding, Report, Verdict};
 
 /// GitHub shows ten annotations of a kind a step.

@@ -3,7 +3,8 @@
 //! One line, with keys in alphabetical order. JSON has no number for NaN and ±∞: such a value is null, and `not_finite` of the same object gives its
 //! path and its name.
 
-use super::{Options, words};
+use super::options::Options;
+use super::words;
 use crate::finding::{Diagnosis, Entry, Finding, Reason, Report};
 use crate::matrix::Matrix;
 use serde_json::{Map, Value, json};

@@ -1,7 +1,8 @@
 //! JUnit XML after the schema of Jenkins' xUnit plugin: junit-10.xsd of github.com/jenkinsci/xunit-plugin.
 
+use super::options::Options;
 use super::severity::{Severity, failure_of_the_whole, severity};
-use super::{Options, words};
+use super::words;
 use crate::finding::{Finding, Report, Verdict};
 
 pub(super) fn write(report: &Report, options: &Options) -> String {

@@ -1,7 +1,8 @@
 //! Markdown for the summary of a job.
 
+use super::options::Options;
 use super::severity::{Severity, worst_first};
-use super::{Options, words};
+use super::words;
 use crate::finding::{Finding, Report};
 
 /// The length of the text in bytes from which on rows are left out. GitHub refuses summaries above 1 MiB.

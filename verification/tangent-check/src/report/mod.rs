@@ -7,10 +7,13 @@ mod github;
 mod json;
 mod junit;
 mod markdown;
+mod options;
 mod sarif;
 mod severity;
 mod terminal;
 mod words;
+
+pub use options::Options;
 
 use crate::finding::{Finding, Reason, Report, Verdict};
 use std::fmt;
@@ -37,15 +40,6 @@ pub enum Format {
 
 /// The JSON Schema of [`Format::Json`].
 pub const JSON_SCHEMA: &str = include_str!("json.schema.json");
-
-/// What a report needs beside the findings.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Options {
-    /// The source file of the law, relative to the root of the repository. Annotations and SARIF results point to it.
-    pub file: Option<String>,
-    /// Whether an inexact tangent counts as wrong.
-    pub strict: bool,
-}
 
 /// A name that is not a format.
 #[derive(Clone, Debug, PartialEq, Eq)]

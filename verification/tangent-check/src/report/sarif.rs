@@ -1,8 +1,9 @@
 //! A log after SARIF 2.1.0, the Static Analysis Results Interchange Format of OASIS.
 
 use super::json::sorted;
+use super::options::Options;
 use super::severity::{Severity, failure_of_the_whole, worst_first};
-use super::{Options, words};
+use super::words;
 use crate::finding::{Finding, Report, Verdict};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;

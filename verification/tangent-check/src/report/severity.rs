@@ -1,11 +1,11 @@
 //! The severity of findings, which all formats for machines share.
 
-use super::Options;
+use super::options::Options;
 use super::words;
 use crate::finding::{Finding, Report, Verdict};
 use std::cmp::Reverse;
 
-/// What a finding means for a build, from best to worst.
+/// The meaning of a finding for a build, from best to worst.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Severity {
     /// The tangent is the derivative.

@@ -1,7 +1,8 @@
 //! A table and sentences in plain text.
 
+use super::options::Options;
 use super::severity::{Severity, worst_first};
-use super::{Options, words};
+use super::words;
 use crate::finding::{Finding, Report, Verdict};
 
 /// The greatest width of a line, in characters.
@@ -131,7 +132,7 @@ fn details(lines: &mut Vec<String>, report: &Report, options: &Options, most: us
     blank(lines);
 }
 
-/// What the table does not show of a finding.
+/// The numbers of a finding that the table does not show.
 fn numbers(report: &Report, finding: &Finding) -> Vec<String> {
     match finding.verdict {
         Verdict::NotChecked => vec![words::cause(finding.reason.as_ref())],

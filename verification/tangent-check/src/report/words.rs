@@ -1,6 +1,6 @@
 //! The sentences and numbers of reports.
 
-use super::Options;
+use super::options::Options;
 use crate::finding::{Diagnosis, Entry, Finding, Reason, Report, Verdict};
 
 /// The name of a verdict.
@@ -61,12 +61,12 @@ pub(super) fn cause(reason: Option<&Reason>) -> String {
         Some(Reason::ControlMissed(size)) => {
             format!("The check did not see an error of relative size {} that it had planted itself.", number(*size))
         }
-        Some(Reason::CallFailed(text)) => format!("A call of the law failed: {text}"),
+        Some(Reason::CallFailed(text)) => text.clone(),
         None => "The check gave no reason.".to_owned(),
     }
 }
 
-/// What to do about a reason.
+/// The advice about a reason.
 fn advice(reason: Option<&Reason>) -> &'static str {
     match reason {
         Some(Reason::Kink) => "choose states away from yield surfaces and other kinks",
@@ -75,7 +75,7 @@ fn advice(reason: Option<&Reason>) -> &'static str {
         Some(Reason::TooNoisy(_) | Reason::ControlMissed(_)) => {
             "compute in double precision, and tighten the tolerance of local iterations in the law"
         }
-        Some(Reason::CallFailed(_)) => "call the law in this state alone and repair it",
+        Some(Reason::CallFailed(_)) => "mend what the sentence names, and call the law in this state alone",
         None => "report this to the authors of the check",
     }
 }
@@ -221,7 +221,7 @@ fn consistent(report: &Report) -> String {
         1 => " One state lies on a kink and was not checked.".to_owned(),
         kinks => format!(" {kinks} states lie on kinks and were not checked."),
     };
-    format!("Verdict: consistent. The tangent is the derivative in {part}.{kinks} Nothing to do.")
+    format!("Verdict: consistent. The tangent is the derivative in {part}.{kinks}")
 }
 
 fn not_checked(report: &Report) -> String {

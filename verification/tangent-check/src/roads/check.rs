@@ -8,7 +8,7 @@ use crate::judge::{Loading, check_along};
 use crate::law::{CallFailed, Law, Response, Step};
 use crate::matrix::Matrix;
 use crate::states::Path;
-use crate::tensor::{exponential, scaled};
+use crate::tensor::{exponential, norm, product, product3, rotation_about, scaled, sum, transposed};
 use std::cell::RefCell;
 
 /// The response with column k perturbed by h.
@@ -23,6 +23,9 @@ const DIAGNOSED: usize = 10;
 const PROBED: usize = 6;
 /// Derivatives to both sides that differ by more than this, relative to the greatest entry, are a kink.
 const SIDES: f64 = 1e-6;
+
+/// A stress that errs by more than this of its size after a rotation does not turn with the body.
+const OBJECTIVE: f64 = 1e-6;
 
 /// A step of a path with its response.
 #[derive(Clone, Debug)]
@@ -108,6 +111,7 @@ fn report(law: &mut dyn Law, paths: &[Path], seed: u64, check: &mut Check) -> Re
     }
     let travelled: Vec<Travelled> =
         roads(&read, convention.measure).into_iter().map(|road| travel(law, road, &visits, check)).collect();
+    report.notes.extend(note_of_objectivity(law, &visits));
     report.notes.extend(note_of_roads(&travelled));
     if let Some(chosen) = travelled.into_iter().min_by_key(Travelled::wrong) {
         diagnose_into(law, &visits, &chosen, &mut report);
@@ -214,6 +218,33 @@ fn note_of_meaning(read: &[Input], measure: Measure) -> Option<String> {
     let text = "The law reads the strain increment and not F. If it was written for small strain, its tangent means ∂σ/∂Δε: check it with this \
                 meaning (bfree check-law: --tangent strain).";
     (small && rate).then(|| text.to_string())
+}
+
+/// A law whose stress does not turn with the body: σ(Q F) = Q σ(F) Qᵀ. The check along a frozen rotation cannot see it.
+fn note_of_objectivity(law: &mut dyn Law, visits: &[Visit]) -> Option<String> {
+    let convention = law.convention();
+    let rotation = rotation_about(if convention.plane() { [0.0, 0.0, 0.4] } else { [0.3, -0.5, 0.4] });
+    let mut greatest: f64 = 0.0;
+    for visit in visits.iter().step_by(visits.len().div_ceil(PROBED).max(1)) {
+        let mut turned = visit.step.clone();
+        if !turned.turn_to(&product(&rotation, &visit.step.gradient)) {
+            continue;
+        }
+        let stress = cauchy_stress(&convention, &visit.response.stress, &visit.step.gradient).ok();
+        let other = law
+            .respond(&turned)
+            .ok()
+            .and_then(|response| cauchy_stress(&convention, &response.stress, &turned.gradient).ok());
+        if let Some((stress, other)) = stress.zip(other) {
+            let expected = product3(&rotation, &stress, &transposed(&rotation));
+            greatest = greatest.max(norm(&sum(&other, -1.0, &expected)) / norm(&stress).max(f64::MIN_POSITIVE));
+        }
+    }
+    let text = format!(
+        "The stress does not turn with the body: after a rotation it errs by up to {greatest:.0e} of its size. The law is not objective, and its \
+         tangent can hold only without rotation. Its axes should turn with the body."
+    );
+    (greatest > OBJECTIVE).then_some(text)
 }
 
 fn note_of_roads(travelled: &[Travelled]) -> Option<String> {

@@ -18,7 +18,7 @@ pub struct Planted<'a> {
     pub asked: Vec<Tensor>,
 }
 
-/// What is wrong in a tangent.
+/// A mistake in a tangent.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Mistake {
     None,

@@ -1,4 +1,4 @@
-//! What the checker must find in a story.
+//! The findings that a story must have.
 
 use crate::algebra::step;
 use crate::witness;

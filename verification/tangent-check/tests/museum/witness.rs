@@ -41,7 +41,7 @@ pub fn law(law: &mut dyn Law, step: &Step) -> (f64, usize, usize) {
     worst(&claimed, &measured)
 }
 
-/// What a law's tangent is the derivative of, moved by h along a component of the strain.
+/// The stress whose derivative is the law's tangent, moved by h along a component of the strain.
 fn change(law: &mut dyn Law, step: &Step, column: usize, h: f64) -> Vec<f64> {
     let unit = strain(column);
     match law.convention().measure {

@@ -8,19 +8,6 @@ use crate::convention::{Components, Convention, Measure, Tensor};
 use crate::law::{Response, Step};
 use crate::library::{Description, Kind, Signature};
 
-/// The measures, each with its index as its number.
-const MEASURES: [Measure; 9] = [
-    Measure::PiolaByGradient,
-    Measure::SecondPiolaByGreen,
-    Measure::CauchyByStrain,
-    Measure::JaumannKirchhoff,
-    Measure::JaumannCauchy,
-    Measure::Truesdell,
-    Measure::GreenNaghdi,
-    Measure::CauchyByGradient,
-    Measure::KirchhoffByGradient,
-];
-
 /// A message under construction.
 #[derive(Default)]
 pub(super) struct Writer {
@@ -110,7 +97,7 @@ impl Writer {
     }
 
     fn measure(&mut self, measure: Measure) {
-        let index = MEASURES.iter().position(|known| *known == measure);
+        let index = Measure::ALL.iter().position(|known| *known == measure);
         self.byte(index.map_or(u8::MAX, |index| index as u8));
     }
 
@@ -248,7 +235,7 @@ impl<'a> Reader<'a> {
     }
 
     fn measure(&mut self) -> Option<Measure> {
-        MEASURES.get(usize::from(self.byte()?)).copied()
+        Measure::ALL.get(usize::from(self.byte()?)).copied()
     }
 
     fn components(&mut self) -> Option<Components> {
@@ -303,7 +290,7 @@ mod tests {
     use crate::law::Step;
     use crate::library::{empty_response, umat};
 
-    /// What is written is read again; a message that is cut anywhere gives `None` instead of a panic.
+    /// A reader gives back the written values; a message that is cut anywhere gives `None` instead of a panic.
     #[test]
     fn round_trip() {
         let description = Description {
