@@ -149,6 +149,32 @@ fn memory_is_restarted_to_the_bit() -> Result<(), Failure> {
     Ok(())
 }
 
+/// The tangent check of a run sees a claim that does not hold where the body turns, and a claim of another meaning.
+#[test]
+fn claims_are_compared_with_differences() -> Result<(), Failure> {
+    let Some(library) = Library::of("fixed_axes.f90")? else { return Ok(()) };
+    let law = |properties: [f64; 9], tangent: &str| json!({"umat": {"library": library.name(), "properties": properties, "tangent": tangent}});
+    let orthotropic = [2.0, 1.0, 0.5, 0.3, 0.25, 0.2, 0.4, 0.3, 0.2];
+    let isotropic = [1.4, 1.4, 1.4, 0.6, 0.6, 0.6, 0.4, 0.4, 0.4];
+    for (properties, tangent, holds) in [
+        (isotropic, "strain", true),
+        (orthotropic, "strain", false),
+        // ∂σ/∂Δε is not the Jaumann rate of the Kirchhoff stress.
+        (isotropic, "jaumann_kirchhoff", false),
+    ] {
+        let mut simulation = built::<2>(&block(2, true, &law(properties, tangent)))?;
+        simulation.settings.check_tangent = NonZeroU64::new(1);
+        match simulation.advance() {
+            Ok(_) => assert!(holds, "{properties:?}, {tangent}: nothing is found"),
+            Err(error) => {
+                let message = bfree::causes::on_one_line(&error);
+                assert!(!holds && message.contains("claims a tangent that is not the derivative"), "{message}");
+            }
+        }
+    }
+    Ok(())
+}
+
 /// A law that refuses a state ends the run with its sentence, after shorter steps.
 #[test]
 fn refusals_are_told() -> Result<(), Failure> {

@@ -1,4 +1,4 @@
-"""Implicit finite-strain material point method, and a check of tangents for any law and any code. `__init__.pyi` is the manual."""
+"""Implicit finite-strain material point method, and a check of tangents for any law and any code. `help(…)` of a name explains it."""
 
 from ._bfree import (
     Diagnosis,

@@ -303,37 +303,7 @@ def check_law(
     seed: int = 1,
     name: str | None = None,
 ) -> Report:
-    """Checks that the tangent of a law is the derivative of its stress, in states that are made here or given. There is no tolerance to choose.
-
-    A law that depends on the deformation alone is two functions of F, an array (3, 3): `check_law(lambda F: P(F), lambda F: A(F))`.
-    Any other law is one function of a `LawStep`, which returns (stress, tangent), or (stress, tangent, state) if it has internal variables.
-    `state` are their values at rest.
-
-    | convention | stress | tangent | order |
-    |---|---|---|---|
-    | "piola" | P | ∂P/∂F | 11, 12, 13, 21, … |
-    | "second_piola" | S | ∂S/∂E, E = (FᵀF − I)/2 | voigt |
-    | "abaqus" | σ | DDSDDE: Jaumann rate of J σ, over J | abaqus |
-    | "jaumann_cauchy" | σ | Jaumann rate of σ | abaqus |
-    | "truesdell" | σ | Truesdell rate of σ: the spatial tangent | voigt |
-    | "green_naghdi" | σ | Green–Naghdi rate of J σ, over J | abaqus |
-    | "cauchy_strain" | σ | ∂σ/∂Δε, with the rotation of the step frozen | voigt |
-    | "cauchy_gradient" | σ | ∂σ/∂F | voigt, 11, 12, 13, 21, … |
-    | "kirchhoff_gradient" | J σ | ∂(J σ)/∂F | voigt, 11, 12, 13, 21, … |
-
-    Stresses are tensors (3, 3) or vectors, tangents are tensors (3, 3, 3, 3) or matrices. Axes of length 1 at their end are left out.
-    `order` is that of the vector of a symmetric tensor: "voigt" 11, 22, 33, 23, 13, 12; "abaqus" 11, 22, 33, 12, 13, 23;
-    "explicit" 11, 22, 33, 12, 23, 13; "mfront" as abaqus with shears times √2. Shear strains are 2 ε in voigt and abaqus, ε in explicit.
-    With `dimension=2` all tensors are (2, 2), and components with index 3 are left out.
-
-    `states` are deformation gradients F, or rows of them for a path of several steps, each with a name or not. Each step takes the time
-    `dt`. Without them, twelve paths are made from `seed`: small to large strains, J from 0.5 to 2, rotations, unloading, reloading; and paths
-    around the yield surface of a law whose internal variables show one.
-
-    An exception in one state is a finding with its text. If all states fail, the first exception is raised.
-
-    Raises ValueError or TypeError for a convention or a shape that does not exist.
-    """
+    ...
 
 def check_law_library(
     library: str | os.PathLike[str],
@@ -353,17 +323,7 @@ def check_law_library(
     seed: int = 1,
     limit: float = 5.0,
 ) -> Report:
-    """`check_law` of a law in a shared library: a UMAT, an MFront behaviour `mfront`, or a law `c` with the header bfree_law.h.
-
-    The library runs in a child process: a crash, an endless loop or a STOP is a finding, after `limit` seconds at the latest. This call runs
-    the library's code.
-
-    `state` is the number of internal variables of a UMAT, or their names, or names with values at rest. `tangent` is the meaning of a UMAT's
-    DDSDDE: "jaumann_kirchhoff" (Abaqus at finite strain), "jaumann_cauchy" or "strain". `temperature` and `name` are its TEMP and CMNAME.
-    `external` are external state variables of a behaviour of MFront.
-
-    Raises ValueError if the law cannot be called. Linux and macOS only.
-    """
+    ...
 
 def check_tangent(
     residual: Callable[[NDArray[np.float64]], Any],
@@ -376,24 +336,7 @@ def check_tangent(
     seed: int = 1,
     name: str | None = None,
 ) -> Report:
-    """Checks that a tangent is the derivative of a residual at u. There is no tolerance to choose.
-
-    u and the residual are arrays of any shape. `jacobian` is the tangent at u: an array, a SciPy sparse matrix, a LinearOperator, or anything
-    else with `shape` and `@`; or a function `jacobian(u)` that returns one; or a function `jvp(u, w)` that returns the product with w.
-
-    `terms` are parts of the residual with their tangents, each checked by itself: {"inertia": (residual, jacobian), …}. If the tangent of the
-    whole lacks one of them, or has it with a wrong sign or factor, the report says so.
-
-    Up to 30 unknowns each column is measured, otherwise three random directions. Then halving finds a wrong entry.
-
-    `start` is u at the start of the step, by default 0. A deviation below 1e-5 is inexact in place of wrong if the residual jumps on the way from
-    there to u: the trace of a local iteration with a loose tolerance.
-
-    `scale` is a change of u over which the residual changes its nature, a number or an array like u: unknowns of different units need an
-    array. The default is the greatest |u|, or 1. Rows of different units should be checked apart.
-
-    Raises what residual and jacobian raise at u, and ValueError for shapes that do not fit.
-    """
+    ...
 
 def newton_order(norms: ArrayLike, *, round_off: float | None = None) -> NewtonOrder:
     """The order of convergence from the residual norms of a solution: ‖R‖ at the initial guess and after each iteration.
@@ -407,7 +350,7 @@ def newton_table(
     *,
     round_off: float | None = None,
 ) -> str:
-    """A table of residual norms with their order of convergence, a row for each solution. LaTeX needs the package booktabs."""
+    ...
 
 @final
 class LawStep:

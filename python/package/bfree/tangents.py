@@ -1,6 +1,6 @@
 """The check of tangents: the shapes of laws and residuals, and mistakes that explain a wrong tangent of a residual.
 
-Measuring and judging is Rust's (the crate `tangent-check`); `__init__.pyi` documents the functions.
+Measuring and judging is Rust's (the crate `tangent-check`).
 """
 
 import inspect
@@ -25,6 +25,37 @@ ROUND = 1e-5
 def check_law(
     stress, tangent=None, *, convention="piola", order=None, dimension=3, state=(), states=None, dt=0.1, seed=1, name=None
 ):
+    """Checks that the tangent of a law is the derivative of its stress, in states that are made here or given. There is no tolerance to choose.
+
+    A law that depends on the deformation alone is two functions of F, an array (3, 3): `check_law(lambda F: P(F), lambda F: A(F))`.
+    Any other law is one function of a `LawStep`, which returns (stress, tangent), or (stress, tangent, state) if it has internal variables.
+    `state` are their values at rest.
+
+    | convention | stress | tangent | order |
+    |---|---|---|---|
+    | "piola" | P | ∂P/∂F | 11, 12, 13, 21, … |
+    | "second_piola" | S | ∂S/∂E, E = (FᵀF − I)/2 | voigt |
+    | "abaqus" | σ | DDSDDE: Jaumann rate of J σ, over J | abaqus |
+    | "jaumann_cauchy" | σ | Jaumann rate of σ | abaqus |
+    | "truesdell" | σ | Truesdell rate of σ: the spatial tangent | voigt |
+    | "green_naghdi" | σ | Green–Naghdi rate of J σ, over J | abaqus |
+    | "cauchy_strain" | σ | ∂σ/∂Δε, with the rotation of the step frozen | voigt |
+    | "cauchy_gradient" | σ | ∂σ/∂F | voigt, 11, 12, 13, 21, … |
+    | "kirchhoff_gradient" | J σ | ∂(J σ)/∂F | voigt, 11, 12, 13, 21, … |
+
+    Stresses are tensors (3, 3) or vectors, tangents are tensors (3, 3, 3, 3) or matrices. Axes of length 1 at their end are left out.
+    `order` is that of the vector of a symmetric tensor: "voigt" 11, 22, 33, 23, 13, 12; "abaqus" 11, 22, 33, 12, 13, 23;
+    "explicit" 11, 22, 33, 12, 23, 13; "mfront" as abaqus with shears times √2. Shear strains are 2 ε in voigt and abaqus, ε in explicit.
+    With `dimension=2` all tensors are (2, 2), and components with index 3 are left out.
+
+    `states` are deformation gradients F, or rows of them for a path of several steps, each with a name or not. Each step takes the time
+    `dt`. Without them, twelve paths are made from `seed`: small to large strains, J from 0.5 to 2, rotations, unloading, reloading; and paths
+    around the yield surface of a law whose internal variables show one.
+
+    An exception in one state is a finding with its text. If all states fail, the first exception is raised.
+
+    Raises ValueError or TypeError for a convention or a shape that does not exist.
+    """
     meaning = _bfree.Convention(convention, order, dimension)
     shapes = _Shapes(convention, meaning, dimension)
     at_rest = np.array(state, float).ravel()
@@ -58,6 +89,17 @@ def check_law_library(
     seed=1,
     limit=5.0,
 ):
+    """`check_law` of a law in a shared library: a UMAT, an MFront behaviour `mfront`, or a law `c` with the header bfree_law.h.
+
+    The library runs in a child process: a crash, an endless loop or a STOP is a finding, after `limit` seconds at the latest. This call runs
+    the library's code.
+
+    `state` is the number of internal variables of a UMAT, or their names, or names with values at rest. `tangent` is the meaning of a UMAT's
+    DDSDDE: "jaumann_kirchhoff" (Abaqus at finite strain), "jaumann_cauchy" or "strain". `temperature` and `name` are its TEMP and CMNAME.
+    `external` are external state variables of a behaviour of MFront.
+
+    Raises ValueError if the law cannot be called. Linux and macOS only.
+    """
     if not hasattr(_bfree, "check_law_in_library"):
         raise NotImplementedError("laws in shared libraries are checked on Linux and macOS only")
     if not sys.executable:
@@ -84,6 +126,24 @@ def check_law_library(
 
 
 def check_tangent(residual, jacobian, u, *, terms=None, start=None, scale=None, seed=1, name=None):
+    """Checks that a tangent is the derivative of a residual at u. There is no tolerance to choose.
+
+    u and the residual are arrays of any shape. `jacobian` is the tangent at u: an array, a SciPy sparse matrix, a LinearOperator, or anything
+    else with `shape` and `@`; or a function `jacobian(u)` that returns one; or a function `jvp(u, w)` that returns the product with w.
+
+    `terms` are parts of the residual with their tangents, each checked by itself: {"inertia": (residual, jacobian), …}. If the tangent of the
+    whole lacks one of them, or has it with a wrong sign or factor, the report says so.
+
+    Up to 30 unknowns each column is measured, otherwise three random directions. Then halving finds a wrong entry.
+
+    `start` is u at the start of the step, by default 0. A deviation below 1e-5 is inexact in place of wrong if the residual jumps on the way from
+    there to u: the trace of a local iteration with a loose tolerance.
+
+    `scale` is a change of u over which the residual changes its nature, a number or an array like u: unknowns of different units need an
+    array. The default is the greatest |u|, or 1. Rows of different units should be checked apart.
+
+    Raises what residual and jacobian raise at u, and ValueError for shapes that do not fit.
+    """
     u = _numbers("u", u).copy()
     if not u.size:
         raise ValueError("u is empty")
@@ -95,7 +155,7 @@ def check_tangent(residual, jacobian, u, *, terms=None, start=None, scale=None, 
     with np.errstate(all="ignore"):
         whole = _Checked("the whole", residual, jacobian, place)
         parts = {
-            term: _Checked(f"term {term}", *pair, place, whole.shape) for term, pair in (terms or {}).items()
+            term: _Checked(f"term {term}", *_pair(term, pair), place, whole.shape) for term, pair in (terms or {}).items()
         }
         every = [whole, *parts.values()]
         diagnoses, notes = _explain(whole, parts)
@@ -111,11 +171,20 @@ def check_tangent(residual, jacobian, u, *, terms=None, start=None, scale=None, 
 
 
 def newton_table(solutions, form="text", *, round_off=None):
+    """A table of residual norms with their order of convergence, a row for each solution. LaTeX needs the package booktabs."""
     if not isinstance(solutions, Mapping):
+        if any(np.ndim(norms) != 1 for norms in solutions):
+            raise TypeError("the solutions must be lists of norms, or a mapping of names to lists: newton_table({'step 1': [1.0, 1e-3]})")
         solutions = {str(number): norms for number, norms in enumerate(solutions, 1)}
     return _bfree.newton_rows(
         [(str(name), _numbers("the norms", norms).tolist()) for name, norms in solutions.items()], form, round_off
     )
+
+
+def _pair(term, pair):
+    if not isinstance(pair, (tuple, list)) or len(pair) != 2:
+        raise TypeError(f"term {term!r} must be a pair (residual, jacobian) of functions of u, not {type(pair).__name__}")
+    return pair
 
 
 def _name(function, otherwise):

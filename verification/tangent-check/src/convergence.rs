@@ -85,7 +85,8 @@ impl Solution {
         let floor = self.floor();
         let order = |three: &[f64]| {
             let (before, now) = (three[1] / three[0], three[2].max(f64::MIN_POSITIVE) / three[1]);
-            let falls = three[1] > floor && before <= CONVERGES && now < 1.0;
+            let finite = three.iter().all(|norm| norm.is_finite());
+            let falls = finite && three[1] > floor && before <= CONVERGES && now < 1.0;
             let order = now.ln() / before.ln();
             (falls && (three[2] > floor || order >= QUADRATIC)).then_some(order)
         };
@@ -190,8 +191,23 @@ fn markdown(rows: &[Vec<String>]) -> String {
     format!("{}{rule}|\n{}", line(&rows[0]), rows[1..].iter().map(line).collect::<String>())
 }
 
+/// Text in which LaTeX takes no character for a command; formulas stay.
+fn escaped(cell: &str) -> String {
+    if cell.starts_with('$') {
+        return cell.to_owned();
+    }
+    let escape = |c: char| match c {
+        '&' | '%' | '$' | '#' | '_' | '{' | '}' => format!("\\{c}"),
+        '\\' => "\\textbackslash{}".to_owned(),
+        '~' => "\\textasciitilde{}".to_owned(),
+        '^' => "\\textasciicircum{}".to_owned(),
+        c => c.to_string(),
+    };
+    cell.chars().map(escape).collect()
+}
+
 fn latex(rows: &[Vec<String>]) -> String {
-    let line = |row: &Vec<String>| row.join(" & ").replace('%', "\\%") + " \\\\\n";
+    let line = |row: &Vec<String>| row.iter().map(|cell| escaped(cell)).collect::<Vec<_>>().join(" & ") + " \\\\\n";
     let columns = "r".repeat(rows[0].len() - 2);
     let body: String = rows[1..].iter().map(line).collect();
     format!(

@@ -2,8 +2,8 @@
 //!
 //! A checked law or residual is a black box: it gives values and claims a tangent. The derivative is measured by extrapolated differences
 //! that know their own error ([`difference`]). The claimed tangent is compared with the measured one ([`judge`]), entry by entry, and each
-//! check spoils the tangent by a small known amount to show that it would see it (the negative control). A wrong tangent is compared with
-//! frequent mistakes ([`diagnosis`]).
+//! check spoils the tangent by a small known amount to show that it would see it (the negative control). [`roads::check_law`] compares a wrong
+//! tangent with frequent mistakes ([`diagnosis`]). [`judge::check_columns`] does not, because it does not know what the columns mean.
 //!
 //! # A law with a wrong sign
 //!

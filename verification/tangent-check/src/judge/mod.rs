@@ -12,7 +12,7 @@ pub use directions::{Directions, Product, Residual, check_directions};
 pub use loose::Jump;
 pub use measured::Measured;
 
-use crate::difference::{ERRORS, Estimate};
+use crate::difference::Estimate;
 use crate::finding::{Entry, Finding, Reason, Verdict};
 use crate::matrix::Matrix;
 use evidence::{ColumnVerdict, Evidence};
