@@ -6,6 +6,7 @@ pub use arrays::ArrayUse;
 
 use crate::approximation::ShapeFunction;
 use crate::material::Law;
+use crate::mechanics::dilatation::Cells;
 use crate::mechanics::loads::{Motion, Pressing, SurfaceLoad};
 use crate::mechanics::reference::GridReset;
 use crate::mechanics::sweep::{SupportError, Supports};
@@ -136,17 +137,18 @@ impl Plan {
         let prescribed = simulation.prescribed(nodes);
         let following = Unknowns::new(&supports, &prescribed).following_mask(supports.nodes());
         let following: usize = following.into_iter().map(usize::from).sum();
+        let cells = mixed_cells(simulation, &supports);
         Ok(Self {
             dimension: D,
             particles: simulation.particles.solid_places().len(),
             grid_nodes: simulation.grid.node_count(),
             active_nodes: nodes.len(),
-            unknowns: D * supports.nodes() - prescribed.len() - following,
+            unknowns: D * supports.nodes() - prescribed.len() - following + cells,
             grid_reset: simulation.settings.grid_reset,
             krylov: simulation.krylov(),
             preconditioner: simulation.preconditioner(),
-            terms: terms(simulation, &supports),
-            arrays: arrays(simulation, &supports),
+            terms: terms(simulation, &supports, cells),
+            arrays: arrays(simulation, &supports, cells),
             surfaces: SurfaceUse::of(simulation),
             sharing: sharing(simulation, &supports),
         })
@@ -178,6 +180,12 @@ impl Plan {
     }
 }
 
+/// The number of averaged cells whose dilatations are unknowns of their own.
+fn mixed_cells<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, supports: &Supports<D>) -> usize {
+    let cells = || Cells::of(&simulation.particles, &simulation.bodies, supports);
+    if simulation.is_mixed() { cells().map_or(0, |cells| cells.scales.len()) } else { 0 }
+}
+
 /// Bodies that share nodes, and how far apart they are.
 fn sharing<const D: usize, L: Law, A: ShapeFunction>(
     simulation: &Simulation<D, L, A>,
@@ -193,7 +201,11 @@ fn sharing<const D: usize, L: Law, A: ShapeFunction>(
     simulation.sharing(supports).iter().map(said).collect()
 }
 
-fn terms<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, supports: &Supports<D>) -> Vec<TermUse> {
+fn terms<const D: usize, L: Law, A>(
+    simulation: &Simulation<D, L, A>,
+    supports: &Supports<D>,
+    cells: usize,
+) -> Vec<TermUse> {
     let loads = &simulation.loads;
     let settings = &simulation.settings;
     let scheme = &*settings.scheme;
@@ -209,6 +221,11 @@ fn terms<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, supports: 
     };
     let mut all = planned(loads, scheme, settings.lumping, averages, simulation.may_reset());
     all.extend([
+        (
+            "dilatation of cells",
+            cells > 0,
+            format!("{cells} cells have an unknown of their own: nearly incompressible, in long steps"),
+        ),
         ("aggregation", settings.aggregation, aggregated),
         ("smoothing", smooths, "only with a transfer other than flip".into()),
         ("choice of laws", simulation.bodies.len() > 1, choice_of_laws),

@@ -1,10 +1,11 @@
-//! The linearised tangent on the grid: as a bilinear form on cells, from which multigrid makes coarser grids; and its sparsity pattern.
+//! The linearised tangent on the grid: as a bilinear form on cells, from which multigrid makes coarser grids.
 
 use crate::lanes::LANES;
 use crate::mechanics::sweep::{At, Group};
 use crate::mechanics::tangent::Tangent;
+use crate::mechanics::terms::Along;
 use crate::mechanics::unknowns::padded;
-use crate::solver::{LocalForm, Neighbours};
+use crate::solver::LocalForm;
 use crate::tensor::{Tensor, Vector};
 use std::collections::HashMap;
 
@@ -12,8 +13,29 @@ impl<const D: usize> Tangent<'_, D> {
     /// The tangent as a form on cells: tangent moduli and masses, summed over the particles of each cell. Terms at nodes add a block for
     /// each node, the force under uniform motions.
     pub(super) fn on_cells(&self) -> LocalForm {
-        let grid = self.supports.grid();
+        let (mut form, cells) = self.occupied_cells();
         let tiles = D.pow(4);
+        // The form takes gradients in units of 1/h.
+        let factor = self.supports.grid().spacing.recip().powi(2);
+        for (j, l) in (0..D).flat_map(|j| (0..D).map(move |l| (j, l))) {
+            let (mut unit, mut gradient) = (At::<f64, D, D>::zero(), Tensor::zeros());
+            unit.gradient[j][l] = [1.0; LANES];
+            gradient[(j, l)] = 1.0;
+            self.probe(&unit, &gradient, |group, sums| {
+                for (lane, cell) in in_cells(&cells[group]) {
+                    for (i, k) in (0..D).flat_map(|i| (0..D).map(move |k| (i, k))) {
+                        form.tangents[cell * tiles + ((i * D + k) * D + j) * D + l] +=
+                            factor * sums.gradient[i][k][lane];
+                    }
+                }
+            });
+        }
+        form
+    }
+
+    /// The form without tangent moduli: nodes, occupied cells, and masses. Also the cells of the particles of every group.
+    pub(super) fn occupied_cells(&self) -> (LocalForm, Vec<[Option<usize>; LANES]>) {
+        let grid = self.supports.grid();
         let mut form = LocalForm {
             grid: std::array::from_fn(|k| if k < D { grid.cells[k] } else { 0 }),
             aggregated: self.supports.extension().is_some(),
@@ -23,39 +45,30 @@ impl<const D: usize> Tangent<'_, D> {
             follows: self.unknowns.following_mask(self.supports.nodes()),
             ..LocalForm::default()
         };
-        let terms: Vec<_> =
-            self.terms.iter().filter_map(|term| term.product_at_points(None)).map(|(_, add)| add).collect();
-        let probe = |group: Group<'_>, at: &At<f64, D, D>| {
-            let mut sums = At::<f64, D, D>::zero();
-            terms.iter().for_each(|add| add(group, at, &mut sums));
-            sums
-        };
-        // The form takes gradients in units of 1/h.
-        let factor = grid.spacing.recip().powi(2);
-        let mut places = HashMap::new();
-        self.supports.each_group(|group| {
-            let cells = self.cells_of(group, &mut places, &mut form);
-            let mut at = At::<f64, D, D>::zero();
-            at.value[0] = [1.0; LANES];
-            let sums = probe(group, &at);
-            for (lane, cell) in in_cells(&cells) {
+        let (mut places, mut cells) = (HashMap::new(), vec![[None; LANES]; self.supports.groups()]);
+        self.supports.each_group(|group| cells[group.number] = self.cells_of(group, &mut places, &mut form));
+        form.finish_centres();
+        let mut unit = At::<f64, D, D>::zero();
+        unit.value[0] = [1.0; LANES];
+        self.probe(&unit, &Tensor::zeros(), |group, sums| {
+            for (lane, cell) in in_cells(&cells[group]) {
                 form.masses[cell] += sums.value[0][lane];
             }
-            for (j, l) in (0..D).flat_map(|j| (0..D).map(move |l| (j, l))) {
-                let mut at = At::<f64, D, D>::zero();
-                at.gradient[j][l] = [1.0; LANES];
-                let sums = probe(group, &at);
-                for (lane, cell) in in_cells(&cells) {
-                    for (i, k) in (0..D).flat_map(|i| (0..D).map(move |k| (i, k))) {
-                        form.tangents[cell * tiles + ((i * D + k) * D + j) * D + l] +=
-                            factor * sums.gradient[i][k][lane];
-                    }
-                }
-            }
         });
-        form.finish_centres();
         form.blocks = bytemuck::cast_slice(&self.blocks_under_uniform_motion()).to_vec();
-        form
+        (form, cells)
+    }
+
+    /// Calls `take` with the number of each group, and with the result of the product for a value and a gradient that are the same at all
+    /// particles.
+    fn probe(&self, at: &At<f64, D, D>, gradient: &Tensor<f64, D>, mut take: impl FnMut(usize, At<f64, D, D>)) {
+        let along = Along::Gradient(gradient);
+        let terms: Vec<_> = self.terms.iter().filter_map(|term| Some(term.product_at_points(along)?.1)).collect();
+        self.supports.each_group(|group| {
+            let mut sums = At::<f64, D, D>::zero();
+            terms.iter().for_each(|add| add(group, at, &mut sums));
+            take(group.number, sums);
+        });
     }
 
     /// The cell of each particle of a group in the form; `None` for empty lanes and for surface points, which belong to no cell. Adds new
@@ -99,20 +112,6 @@ impl<const D: usize> Tangent<'_, D> {
             blocks.iter_mut().zip(&out).for_each(|(block, out)| block.set_column(k, out));
         }
         blocks
-    }
-
-    /// The sparsity pattern: two nodes share an entry if they support the same particle. The inner nodes that they follow then share
-    /// entries, too.
-    pub(super) fn joined(&self) -> Neighbours {
-        let further = self.terms.iter().map(|term| term.reach()).max().unwrap_or(0);
-        let reach = self.supports.reach() + further;
-        let mut leaders = vec![Vec::new(); self.supports.nodes()];
-        for (outer, _, row) in self.unknowns.followers.rows() {
-            leaders[outer] = row.map(|(leader, _)| leader).collect();
-        }
-        let mut fixed = self.unknowns.following_mask(self.supports.nodes());
-        self.unknowns.prescribed.iter().for_each(|dof| fixed[dof.node * D + dof.component] = true);
-        Neighbours { nodes: self.indices(), reach, leaders, fixed }
     }
 
     fn indices(&self) -> Vec<[u32; 3]> {

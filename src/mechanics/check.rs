@@ -3,10 +3,14 @@
 
 use crate::material::{Law, MaterialState};
 use crate::mechanics::constitutive::{Part, compose};
+use crate::mechanics::mixed::MixedTangent;
 use crate::mechanics::residual::{Equilibrium, Inadmissible};
 use crate::mechanics::tangent::Tangent;
 use crate::mechanics::terms::{Piece, Role};
+use crate::mechanics::trial::Trial;
+use crate::solver::LinearOperator;
 use crate::tensor::{Tensor, Vector, identity, inverse};
+use num_dual::Dual64;
 
 /// The largest accepted relative difference: min(64 eps κ(F)², 1e-10), with κ(F) = ‖F‖ ‖F⁻¹‖.
 ///
@@ -115,36 +119,64 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     /// # Errors
     /// The first mismatch, or a particle with det F ≤ 0.
     pub fn check_tangent(&self, dphi: &[Vector<f64, D>], u: &[Vector<f64, D>]) -> Result<(), CheckError> {
-        let mut u = u.to_vec();
+        self.check_along(Trial::motion(dphi), Trial::motion(u))
+    }
+
+    /// [`Self::check_tangent`] at a trial state, in a direction that depends on `seed`. In the mixed form, the residuals and unknowns of
+    /// cells belong to the product.
+    pub(crate) fn check_tangent_at(&self, at: Trial<'_, f64, D>, seed: u64) -> Result<(), CheckError> {
+        let of_cells: Vec<f64> = direction::<1>(at.dilatation.len(), seed + 1).iter().map(|x| x[0]).collect();
+        self.check_along(at, Trial { dphi: &direction(at.dphi.len(), seed), dilatation: &of_cells })
+    }
+
+    fn check_along(&self, at: Trial<'_, f64, D>, along: Trial<'_, f64, D>) -> Result<(), CheckError> {
+        let mut u = along.dphi.to_vec();
         self.unknowns.clear_prescribed(&mut u);
-        let dphi = &*self.unknowns.extended(dphi);
+        let (u, dphi) = (&u, &*self.unknowns.extended(at.dphi));
+        let (at, along) = (Trial { dphi, ..at }, Trial { dphi: u, ..along });
         let bound = self.worst_bound(dphi)?;
         self.check_claims(dphi)?;
-        let product = |tangent: &Tangent<'_, D>| {
-            let mut out = vec![Vector::zeros(); u.len()];
-            tangent.product(&u, &mut out);
-            out
-        };
-        let (mut whole, mut of_term) = (vec![Vector::zeros(); u.len()], 0.0);
+        let (mut whole, mut of_term, mut largest) = (Rows::zeros(along), 0.0, 0.0_f64);
         for piece in self.terms.pieces() {
-            let mut dual = self.derivative(piece, dphi, &u)?;
-            self.unknowns.clear_prescribed(&mut dual);
-            let analytic = product(&self.tangent_of(piece, dphi)?);
+            let dual = self.dual_rows(piece, at, along)?;
+            let analytic = Rows::product(self.tangent_at(Some(piece), at)?, along);
             // The contributions of a piece may cancel, like those of pressure in 1D. Their size is then the scale of round-off.
-            let mut scale = norm(&dual).max(self.size_of(piece, dphi, &u)?);
+            let mut scale = norm(&dual.nodes).max(self.size_of(piece, dphi, u)?);
             if piece.part == Part::Whole {
                 of_term = scale;
             }
             // A part may be the small difference of two larger numbers, the whole term and the other part.
             scale = scale.max(of_term);
-            compare(piece.name, &analytic, &dual, bound, scale)?;
+            compare(piece.name, &analytic.nodes, &dual.nodes, bound, scale)?;
+            compare(CELLS, &analytic.cells, &dual.cells, bound, norm(&dual.cells))?;
             if piece.part == Part::Whole {
-                whole.iter_mut().zip(&dual).for_each(|(sum, x)| *sum += x);
+                largest = largest.max(norm(&dual.nodes));
+                whole.nodes.iter_mut().zip(&dual.nodes).for_each(|(sum, x)| *sum += x);
+                whole.cells.iter_mut().zip(&dual.cells).for_each(|(sum, x)| *sum += x);
             }
         }
-        let tangent = self.tangent(dphi)?;
-        compare("whole product", &product(&tangent), &whole, bound, norm(&whole))?;
-        self.check_blocks(&tangent, bound)
+        let product = Rows::product(self.tangent_at(None, at)?, along);
+        // Terms may cancel: mean dilatation takes the volumetric stiffness of the law away.
+        compare("whole product", &product.nodes, &whole.nodes, bound, largest.max(norm(&whole.nodes)))?;
+        compare(CELLS, &product.cells, &whole.cells, bound, norm(&whole.cells))?;
+        self.check_blocks(&self.tangent_at(None, at)?, bound)
+    }
+
+    /// A piece of K u by dual numbers.
+    fn dual_rows(
+        &self,
+        piece: Piece,
+        at: Trial<'_, f64, D>,
+        along: Trial<'_, f64, D>,
+    ) -> Result<Rows<D>, Inadmissible> {
+        let dphi: Vec<_> = at.dphi.iter().zip(along.dphi).map(|(x, d)| x.zip_map(d, Dual64::new)).collect();
+        let own: Vec<_> = at.dilatation.iter().zip(along.dilatation).map(|(&x, &d)| Dual64::new(x, d)).collect();
+        let (nodes, cells) = self.residual_at(piece, Trial { dphi: &dphi, dilatation: &own })?;
+        let mut nodes: Vec<_> = nodes.iter().map(|r| r.map(|x| x.eps)).collect();
+        self.unknowns.clear_prescribed(&mut nodes);
+        let mut rows = Rows { nodes, cells: cells.iter().map(|x| Vector::from([x.eps])).collect() };
+        rows.cells.resize(along.dilatation.len(), Vector::zeros());
+        Ok(rows)
     }
 
     /// Lets the laws of a few particles compare what they claim with differences.
@@ -205,6 +237,37 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
             }
         }
         Ok(())
+    }
+}
+
+/// The name of the residuals of cells in messages.
+const CELLS: &str = "mean dilatation, volumes of cells; the node stands for the cell";
+
+/// Entries of a residual: at the nodes, and at the cells in the mixed form.
+struct Rows<const D: usize> {
+    nodes: Vec<Vector<f64, D>>,
+    cells: Vec<Vector<f64, 1>>,
+}
+
+impl<const D: usize> Rows<D> {
+    fn zeros(like: Trial<'_, f64, D>) -> Self {
+        Self { nodes: vec![Vector::zeros(); like.dphi.len()], cells: vec![Vector::zeros(); like.dilatation.len()] }
+    }
+
+    /// The product that the solver applies.
+    fn product(tangent: Tangent<'_, D>, along: Trial<'_, f64, D>) -> Self {
+        let mut rows = Self::zeros(along);
+        if along.dilatation.is_empty() {
+            tangent.product(along.dphi, &mut rows.nodes);
+            return rows;
+        }
+        let x = [bytemuck::cast_slice(along.dphi), along.dilatation].concat();
+        let mut y = vec![0.0; x.len()];
+        MixedTangent { tangent }.apply(&x, &mut y);
+        let (nodes, cells) = y.split_at(D * rows.nodes.len());
+        rows.nodes.copy_from_slice(bytemuck::cast_slice(nodes));
+        rows.cells.copy_from_slice(bytemuck::cast_slice(cells));
+        rows
     }
 }
 

@@ -5,8 +5,9 @@
 //! grid reset. Between two resets θ_n and H keep their values of the last reset.
 
 use crate::lanes::LANES;
-use crate::material::Law;
+use crate::material::{Law, p_wave_modulus};
 use crate::mechanics::sweep::{Number, Supports};
+use crate::mechanics::trial::Trial;
 use crate::particles::{Body, Particles};
 use crate::scalar::Real;
 use crate::tensor::{Deformation, Vector};
@@ -19,6 +20,28 @@ const NONE: u32 = u32::MAX;
 pub(crate) struct Member {
     pub particle: u32,
     pub slot: u32,
+}
+
+/// The units of a cell whose dilatation is an unknown of its own. The unknown is a length and its residual a force, like those of nodes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Scale {
+    /// G/h, the residual per difference of volumes.
+    pub force: f64,
+    /// G/(κ h), the change of Θ per unit of the unknown. The pressure changes by G/h.
+    pub dilatation: f64,
+    /// G, half of what the modulus of uniaxial strain is without U.
+    pub shear: f64,
+}
+
+impl Scale {
+    /// The smallest G, relative to κ.
+    const SMALLEST: f64 = 1e-9;
+
+    fn of<L: Law>(body: &Body<L>, spacing: f64) -> Self {
+        let bulk = body.response::<f64>(0.0).map_or(1.0, |of| of.stiffness);
+        let shear = (0.5 * (p_wave_modulus(&body.law) - bulk)).max(Self::SMALLEST * bulk);
+        Self { force: shear / spacing, dilatation: shear / (bulk * spacing), shear }
+    }
 }
 
 /// The particles whose volume ratios are averaged, cell by cell.
@@ -34,6 +57,8 @@ pub(crate) struct Cells {
     beside: Vec<(usize, usize)>,
     /// Σ V_p
     volumes: Vec<f64>,
+    /// The units of every cell.
+    pub scales: Vec<Scale>,
 }
 
 impl Cells {
@@ -69,7 +94,9 @@ impl Cells {
             of: vec![NONE; particles.len()],
             beside: Vec::new(),
             volumes: Vec::new(),
+            scales: Vec::new(),
         };
+        let scales: Vec<Scale> = bodies.iter().map(|body| Scale::of(body, grid.spacing)).collect();
         let mut keys = Vec::new();
         for same in keyed.chunk_by(|one, next| one.0 == next.0) {
             keys.push(same[0].0);
@@ -78,6 +105,7 @@ impl Cells {
                 cells.of[*particle as usize] = cells.volumes.len() as u32;
                 volume += reference.volume(*particle as usize);
             }
+            cells.scales.push(scales[same[0].0.1 as usize]);
             cells.volumes.push(volume);
             cells.starts.push(cells.starts[cells.volumes.len() - 1] + same.len() as u32);
         }
@@ -130,6 +158,33 @@ impl Cells {
     }
 }
 
+impl Cells {
+    /// Θ − 1 of every cell: that of its own unknown, if it has one, or that of the motion.
+    pub fn changes_at<T: Number, const D: usize>(
+        &self,
+        particles: &Particles<D>,
+        supports: &Supports<D>,
+        at: Trial<'_, T, D>,
+    ) -> Vec<T> {
+        if at.dilatation.is_empty() {
+            return self.changes(particles, supports, at.dphi);
+        }
+        let own = at.dilatation.iter().zip(&self.scales);
+        own.map(|(&unknown, scale)| unknown * T::lit(scale.dilatation)).collect()
+    }
+
+    /// The unknowns of the cells from the present θ of their particles.
+    pub fn unknowns<const D: usize>(&self, particles: &Particles<D>) -> Vec<f64> {
+        let reference = particles.reference();
+        let of = |((members, _), scale): ((&[Member], f64), &Scale)| {
+            let p = members[0].particle as usize;
+            let before = reference.dilatation(p);
+            (particles.dilatation(p) - before) / (1.0 + before) / scale.dilatation
+        };
+        self.iter().zip(&self.scales).map(of).collect()
+    }
+}
+
 /// θ − 1 of θ = Θ θ_n, from Θ − 1 and θ_n − 1.
 #[inline(always)]
 pub(crate) fn total<T: Real>(change: T, before: f64) -> T {
@@ -142,10 +197,10 @@ pub(crate) fn after<const D: usize, L: Law>(
     particles: &Particles<D>,
     bodies: &[Body<L>],
     supports: &Supports<D>,
-    motion: &[Vector<f64, D>],
+    at: Trial<'_, f64, D>,
 ) -> Vec<f64> {
     let Some(cells) = Cells::of(particles, bodies, supports) else { return Vec::new() };
-    let (changes, reference) = (cells.changes(particles, supports, motion), particles.reference());
+    let (changes, reference) = (cells.changes_at(particles, supports, at), particles.reference());
     let seen = |p: usize, cell: usize| total(changes[cell], reference.dilatation(p));
     let of = |p: usize| cells.cell(p as u32).map_or(0.0, |cell| seen(p, cell));
     let mut all: Vec<f64> = (0..particles.len()).map(of).collect();

@@ -8,6 +8,7 @@ use crate::mechanics::constitutive::Part;
 use crate::mechanics::loads::{Loads, PrescribedDof, Pressing};
 use crate::mechanics::sweep::{Mode, Number, Weights};
 use crate::mechanics::terms::{Piece, Role, Step, Terms};
+use crate::mechanics::trial::Trial;
 use crate::mechanics::unknowns::Unknowns;
 use crate::particles::Body;
 use crate::pooled::Pooled;
@@ -63,6 +64,8 @@ pub struct Equilibrium<'a, const D: usize, L> {
     pub prescribed: &'a [PrescribedDof],
     /// The unknowns.
     pub(crate) unknowns: Unknowns<'a, D>,
+    /// Whether the dilatations of averaged cells are unknowns of their own: the mixed form.
+    pub mixed: bool,
     /// A callback that can stop the solution.
     pub stop: Option<&'a Stop>,
 }
@@ -71,7 +74,7 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
     /// The equilibrium of a step with these prescribed degrees of freedom.
     pub fn new(step: Step<'a, D, L>, prescribed: &'a [PrescribedDof]) -> Self {
         let unknowns = Unknowns::new(step.supports, prescribed);
-        Self { step, terms: Terms::of(&step), prescribed, unknowns, stop: None }
+        Self { step, terms: Terms::of(&step), prescribed, unknowns, mixed: false, stop: None }
     }
 
     /// R(Δφ) at every active node. At prescribed degrees of freedom, R is the reaction.
@@ -80,16 +83,16 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
     /// det F ≤ 0. The error names the particle with the smallest id.
     pub fn residual<T: Number>(&self, dphi: &[Vector<T, D>]) -> Result<Vec<Vector<T, D>>, Inadmissible> {
         let mut out = vec![Vector::zeros(); dphi.len()];
-        self.residual_into(dphi, &mut out)?;
+        self.residual_into(Trial::motion(dphi), &mut out)?;
         Ok(out)
     }
 
     pub(crate) fn residual_into<T: Number>(
         &self,
-        dphi: &[Vector<T, D>],
+        at: Trial<'_, T, D>,
         out: &mut [Vector<T, D>],
     ) -> Result<(), Inadmissible> {
-        self.sum_into(|_, _| true, Part::Whole, Weights::Signed, dphi, out)
+        self.sum_into(|_, _| true, Part::Whole, Weights::Signed, at, out)
     }
 
     /// One piece of R(Δφ). Only the occurrences of Δφ in this piece carry derivatives.
@@ -102,8 +105,26 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
         dphi: &[Vector<T, D>],
     ) -> Result<Vec<Vector<T, D>>, Inadmissible> {
         let mut out = vec![Vector::zeros(); dphi.len()];
-        self.sum_into(|name, _| name == piece.term, piece.part, Weights::Signed, dphi, &mut out)?;
+        self.sum_into(|name, _| name == piece.term, piece.part, Weights::Signed, Trial::motion(dphi), &mut out)?;
         Ok(out)
+    }
+
+    /// One piece of R at a trial state: at the nodes, and in the mixed form at the cells.
+    pub(crate) fn residual_at<T: Number>(
+        &self,
+        piece: Piece,
+        at: Trial<'_, T, D>,
+    ) -> Result<(Vec<Vector<T, D>>, Vec<T>), Inadmissible> {
+        let mut out = vec![Vector::zeros(); at.dphi.len()];
+        let picked = |name: &str, _| name == piece.term;
+        self.sum_into(picked, piece.part, Weights::Signed, at, &mut out)?;
+        Ok((out, self.cell_residuals(picked, at)))
+    }
+
+    /// The residuals of the averaged cells in the mixed form; empty in the form of motions alone.
+    pub(crate) fn cell_residuals<T: Number>(&self, picked: impl Fn(&str, Role) -> bool, at: Trial<'_, T, D>) -> Vec<T> {
+        let dphi = &*self.unknowns.extended(at.dphi);
+        self.terms.cell_residuals(picked, Trial { dphi, ..at })
     }
 
     /// The sum of the terms that `picked` selects: contributions at nodes, then contributions at particles in one pass.
@@ -112,16 +133,16 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
         picked: impl Fn(&str, Role) -> bool,
         part: Part,
         weights: Weights,
-        dphi: &[Vector<T, D>],
+        at: Trial<'_, T, D>,
         out: &mut [Vector<T, D>],
     ) -> Result<(), Inadmissible> {
         let magnitude = weights == Weights::Magnitude;
-        let dphi = &*self.unknowns.extended(dphi);
+        let dphi = &*self.unknowns.extended(at.dphi);
         if !magnitude {
             out.fill(Vector::zeros());
             self.terms.add_at_nodes(&picked, dphi, out);
         }
-        let mut points = self.terms.at_points::<T>(&picked, part, dphi);
+        let mut points = self.terms.at_points::<T>(&picked, part, Trial { dphi, ..at });
         // Terms that use values alone add their magnitudes at the nodes.
         points.retain(|(mode, _)| !magnitude || mode.gradient);
         let (modes, all): (Vec<_>, Vec<_>) = points.into_iter().unzip();
@@ -163,7 +184,7 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
     /// The sum of the terms of one role.
     pub(crate) fn forces(&self, role: Role, dphi: &[Vector<f64, D>]) -> Result<Pooled<Vector<f64, D>>, Inadmissible> {
         let mut force = self.step.supports.field();
-        self.sum_into(|_, of| of == role, Part::Whole, Weights::Signed, dphi, &mut force)?;
+        self.sum_into(|_, of| of == role, Part::Whole, Weights::Signed, Trial::motion(dphi), &mut force)?;
         Ok(force)
     }
 
@@ -173,7 +194,11 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
     /// # Errors
     /// See [`Self::residual`].
     pub fn magnitude(&self, dphi: &[Vector<f64, D>]) -> Result<f64, Inadmissible> {
-        Ok(self.free_norm(self.magnitudes(dphi)?))
+        self.magnitude_at(Trial::motion(dphi))
+    }
+
+    pub(crate) fn magnitude_at(&self, at: Trial<'_, f64, D>) -> Result<f64, Inadmissible> {
+        Ok(self.free_norm(self.magnitudes(at)?, at))
     }
 
     /// The round-off bound: like [`Self::magnitude`], plus the change of R when Δφ and F_r are rounded.
@@ -181,21 +206,28 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
     /// # Errors
     /// See [`Self::residual`].
     pub fn sensitivity(&self, dphi: &[Vector<f64, D>]) -> Result<f64, Inadmissible> {
-        let mut out = self.magnitudes(dphi)?;
-        self.terms.add_sensitivity(&self.unknowns.extended(dphi), &mut out)?;
+        self.sensitivity_at(Trial::motion(dphi))
+    }
+
+    pub(crate) fn sensitivity_at(&self, at: Trial<'_, f64, D>) -> Result<f64, Inadmissible> {
+        let mut out = self.magnitudes(at)?;
+        self.terms.add_sensitivity(&self.unknowns.extended(at.dphi), &mut out)?;
         self.unknowns.followers.restrict_magnitudes(&mut out);
-        Ok(self.free_norm(out))
+        Ok(self.free_norm(out, at))
     }
 
-    fn free_norm(&self, mut field: Pooled<Vector<f64, D>>) -> f64 {
+    /// The norm of magnitudes over the unknowns of a trial state.
+    fn free_norm(&self, mut field: Pooled<Vector<f64, D>>, at: Trial<'_, f64, D>) -> f64 {
         self.unknowns.clear_prescribed(&mut field);
-        vector::norm(bytemuck::cast_slice(&field))
+        let nodes = vector::norm(bytemuck::cast_slice(&field));
+        let cells = if at.dilatation.is_empty() { 0.0 } else { vector::norm(&self.terms.cell_magnitudes()) };
+        nodes.hypot(cells)
     }
 
-    fn magnitudes(&self, dphi: &[Vector<f64, D>]) -> Result<Pooled<Vector<f64, D>>, Inadmissible> {
+    fn magnitudes(&self, at: Trial<'_, f64, D>) -> Result<Pooled<Vector<f64, D>>, Inadmissible> {
         let mut out = self.step.supports.field();
-        self.terms.add_magnitudes_at_nodes(&self.unknowns.extended(dphi), &mut out);
-        self.sum_into(|_, _| true, Part::Whole, Weights::Magnitude, dphi, &mut out)?;
+        self.terms.add_magnitudes_at_nodes(&self.unknowns.extended(at.dphi), &mut out);
+        self.sum_into(|_, _| true, Part::Whole, Weights::Magnitude, at, &mut out)?;
         Ok(out)
     }
 
@@ -229,9 +261,15 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
         self.terms.energy(&self.unknowns.extended(dphi))
     }
 
+    /// The trial state in a vector of unknowns: those of the nodes, then those of the cells in the mixed form.
+    pub(crate) fn trial<'x>(&self, x: &'x [f64]) -> Trial<'x, f64, D> {
+        let (nodes, dilatation) = x.split_at(D * self.step.supports.nodes());
+        Trial { dphi: bytemuck::cast_slice(nodes), dilatation }
+    }
+
     /// Whether the tangent is symmetric.
     pub fn is_symmetric(&self) -> bool {
-        unsymmetric(self.step.bodies, self.step.loads).is_none()
+        !self.mixed && unsymmetric(self.step.bodies, self.step.loads).is_none()
     }
 
     /// Sets the prescribed degrees of freedom of a field to zero.

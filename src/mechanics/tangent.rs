@@ -3,13 +3,15 @@
 use crate::lanes::LANES;
 use crate::material::Law;
 use crate::mechanics::constitutive::{Form, Laws};
+use crate::mechanics::mixed::MixedTangent;
 use crate::mechanics::residual::{Equilibrium, Inadmissible};
 use crate::mechanics::sweep::{Group, Mode, Quadratic, Supports};
-use crate::mechanics::terms::{Linearized, Piece};
+use crate::mechanics::terms::{Along, Linearized, MixedCells, Piece};
+use crate::mechanics::trial::Trial;
 use crate::mechanics::unknowns::Unknowns;
 use crate::particles::{Body, Particles};
 use crate::pooled::Pooled;
-use crate::solver::{LinearOperator, Linearization, LocalForm, Neighbours, NonlinearProblem};
+use crate::solver::{LinearOperator, Linearization, LocalForm, NonlinearProblem};
 use crate::tensor::{Tensor, Vector};
 use num_dual::Dual64;
 
@@ -54,12 +56,17 @@ pub struct Tangent<'a, const D: usize> {
 impl<const D: usize> Tangent<'_, D> {
     /// K u on the free degrees of freedom. `u` must be zero on prescribed degrees of freedom.
     pub fn product(&self, u: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
+        self.product_under(u, None, out);
+    }
+
+    /// K u, with given changes of the pressures of averaged cells in place of those that u causes.
+    pub(super) fn product_under(&self, u: &[Vector<f64, D>], pressures: Option<&[f64]>, out: &mut [Vector<f64, D>]) {
         out.fill(Vector::zeros());
         let extended = self.unknowns.extended_in(self.supports.pool(), u);
         let u = extended.as_deref().unwrap_or(u);
         self.terms.iter().for_each(|term| term.add_product_at_nodes(u, out));
         let (modes, all): (Vec<_>, Vec<_>) =
-            self.terms.iter().filter_map(|term| term.product_at_points(Some(u))).unzip();
+            self.terms.iter().filter_map(|term| term.product_at_points(Along::Field(u, pressures))).unzip();
         if let Some(mode) = modes.into_iter().reduce(Mode::and) {
             self.supports.accumulate(Some(u), mode, out, |group, at, sums| {
                 all.iter().for_each(|add| add(group, at, sums));
@@ -68,6 +75,11 @@ impl<const D: usize> Tangent<'_, D> {
         mutant!("unknowns: forces stay at nodes that follow": { return self.unknowns.clear_prescribed(out); });
         self.unknowns.followers.restrict(out);
         self.unknowns.clear_prescribed(out);
+    }
+
+    /// The averaged cells whose dilatation is an unknown of its own.
+    pub(super) fn mixed_cells(&self) -> Option<&dyn MixedCells<D>> {
+        self.terms.iter().find_map(|term| term.mixed())
     }
 
     /// K_II of every active node. Values that are prescribed or follow inner nodes have the row and column of the identity.
@@ -126,7 +138,16 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
         piece: impl Into<Option<Piece>>,
         dphi: &[Vector<f64, D>],
     ) -> Result<Tangent<'_, D>, Inadmissible> {
-        let terms = self.terms.linearize(piece.into(), &self.unknowns.extended(dphi))?;
+        self.tangent_at(piece.into(), Trial::motion(dphi))
+    }
+
+    /// The linearisation at a trial state. In the mixed form it is K + Bᵀ γ B.
+    pub(super) fn tangent_at(
+        &self,
+        piece: Option<Piece>,
+        at: Trial<'_, f64, D>,
+    ) -> Result<Tangent<'_, D>, Inadmissible> {
+        let terms = self.terms.linearize(piece, Trial { dphi: &self.unknowns.extended(at.dphi), ..at })?;
         let (supports, particles) = (self.step.supports, self.step.particles);
         Ok(Tangent { supports, unknowns: self.unknowns.clone(), particles, terms })
     }
@@ -203,31 +224,31 @@ impl<const D: usize> Linearization for Tangent<'_, D> {
     fn local_form(&self) -> Option<LocalForm> {
         Some(self.on_cells())
     }
-
-    fn neighbours(&self) -> Option<Neighbours> {
-        Some(self.joined())
-    }
 }
 
 impl<const D: usize, L: Law> NonlinearProblem for Equilibrium<'_, D, L> {
     type Inadmissible = Inadmissible;
     fn residual(&self, x: &[f64], r: &mut [f64]) -> Result<(), Inadmissible> {
-        let residual = bytemuck::cast_slice_mut(r);
-        self.residual_into::<f64>(bytemuck::cast_slice(x), residual)?;
+        let at = self.trial(x);
+        let (nodes, cells) = r.split_at_mut(D * at.dphi.len());
+        let residual = bytemuck::cast_slice_mut(nodes);
+        self.residual_into(at, residual)?;
         self.unknowns.clear_prescribed(residual);
+        cells.copy_from_slice(&self.cell_residuals(|_, _| true, at));
         Ok(())
     }
 
     fn magnitude(&self, x: &[f64]) -> Result<f64, Inadmissible> {
-        Self::magnitude(self, bytemuck::cast_slice(x))
+        self.magnitude_at(self.trial(x))
     }
 
     fn sensitivity(&self, x: &[f64]) -> Result<f64, Inadmissible> {
-        Self::sensitivity(self, bytemuck::cast_slice(x))
+        self.sensitivity_at(self.trial(x))
     }
 
+    /// None in the mixed form: its solution is a saddle point.
     fn potential(&self, x: &[f64]) -> Option<Result<(f64, f64), Inadmissible>> {
-        Self::potential::<f64>(self, bytemuck::cast_slice(x))
+        if self.mixed { None } else { Self::potential::<f64>(self, bytemuck::cast_slice(x)) }
     }
 
     fn is_symmetric(&self) -> bool {
@@ -239,6 +260,7 @@ impl<const D: usize, L: Law> NonlinearProblem for Equilibrium<'_, D, L> {
     }
 
     fn linearize(&self, x: &[f64]) -> Result<Box<dyn Linearization + '_>, Inadmissible> {
-        Ok(Box::new(self.tangent(bytemuck::cast_slice(x))?))
+        let tangent = self.tangent_at(None, self.trial(x))?;
+        Ok(if self.mixed { Box::new(MixedTangent { tangent }) } else { Box::new(tangent) })
     }
 }

@@ -12,7 +12,7 @@ use crate::mechanics::terms::linearized_rows;
 use crate::mechanics::transfer::Projection;
 use crate::particles::{Body, Particles};
 use crate::simulation::Simulation;
-use crate::solver::{Krylov, Preconditioning, direct_bytes, multigrid_bytes};
+use crate::solver::{Krylov, Preconditioning, multigrid_bytes, saddle_bytes};
 use crate::tensor::{Tensor, Vector};
 use std::mem::size_of;
 
@@ -29,12 +29,14 @@ pub struct ArrayUse {
 pub(super) fn arrays<const D: usize, L: Law, A: ShapeFunction>(
     simulation: &Simulation<D, L, A>,
     supports: &Supports<D>,
+    cells: usize,
 ) -> Vec<ArrayUse> {
     let inventory = Inventory {
         simulation,
         supports,
         particles: simulation.particles.len(),
         nodes: supports.active().len(),
+        cells,
         has_inertia: simulation.settings.scheme.has_inertia(),
         keeps_grid: simulation.settings.grid_reset != GridReset::EveryStep,
     };
@@ -56,6 +58,8 @@ struct Inventory<'a, const D: usize, L, A> {
     particles: usize,
     /// Active nodes.
     nodes: usize,
+    /// Averaged cells whose dilatations are unknowns.
+    cells: usize,
     has_inertia: bool,
     /// Whether the grid is kept over steps.
     keeps_grid: bool,
@@ -122,9 +126,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Inventory<'_, D, L, A> {
         let linearized_dilatation = supports.groups() * LANES * (linearized_rows(D) + 1) * NUMBER;
         let preconditioner = simulation.preconditioner().0;
         let multigrid = preconditioner == Preconditioning::Multigrid;
-        let direct = preconditioner == Preconditioning::Direct;
         let followers = supports.extension().map_or(0, |extension| extension.bytes());
-        let factor = direct_bytes(nodes, D, supports.reach() as usize);
         let krylov_vectors = match simulation.krylov().0 {
             // The basis; residual, correction, trial and product.
             Krylov::Gmres { restart } => restart as usize + 5,
@@ -134,11 +136,11 @@ impl<const D: usize, L: Law, A: ShapeFunction> Inventory<'_, D, L, A> {
             (true, "linearized tangent", linearized),
             (averages, "particles: mean dilatation", self.particles * dilatation_bytes),
             (averages, "linearized tangent: mean dilatation", linearized_dilatation),
-            (!direct, "preconditioner: diagonal blocks", nodes * Self::TENSOR),
+            (true, "preconditioner: diagonal blocks", nodes * Self::TENSOR),
             (followers > 0, "nodes that follow others, and their weights", followers),
             (multigrid, "preconditioner: multigrid levels", multigrid_bytes(nodes, D)),
-            (direct, "preconditioner: assembled tangent and its factor", factor),
-            (true, "Krylov vectors", nodes * krylov_vectors * Self::VECTOR),
+            (self.cells > 0, "preconditioner: Schur complement of cells", saddle_bytes(self.cells, D)),
+            (true, "Krylov vectors", (nodes * D + self.cells) * krylov_vectors * NUMBER),
         ]
     }
 }

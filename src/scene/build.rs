@@ -11,7 +11,7 @@ use crate::mechanics::smoothing::Smoothing;
 use crate::particles::{self, Particles};
 use crate::shape::Shape;
 use crate::simulation::{Settings, Simulation};
-use crate::solver::NewtonSettings;
+use crate::solver::{Forcing, NewtonSettings};
 use crate::tensor::Vector;
 use std::path::Path;
 
@@ -111,6 +111,8 @@ impl Scene {
 
     fn settings(&self) -> Settings {
         let (newton, krylov) = (&self.solver.newton, &self.solver.krylov);
+        // With inertia, linear solves take few iterations, and momentum is kept to more digits by exact ones.
+        let by_itself = if self.time.scheme().has_inertia() { Forcing::default() } else { Forcing::EisenstatWalker };
         Settings {
             scheme: self.time.scheme().scheme(self.time.newmark()),
             lumping: self.time.lumping(),
@@ -128,7 +130,7 @@ impl Scene {
             newton: NewtonSettings {
                 relative_tolerance: newton.tolerance,
                 max_iterations: newton.max_iterations as usize,
-                forcing: krylov.forcing,
+                forcing: krylov.forcing.unwrap_or(by_itself),
                 krylov: krylov.method,
                 max_krylov_iterations: krylov.max_iterations as usize,
             },

@@ -43,8 +43,8 @@ pub struct Krylov {
     pub method: Method,
     /// The preconditioner. Default "automatic".
     pub preconditioner: Preconditioning,
-    /// The tolerance of each linear solve.
-    pub forcing: Forcing,
+    /// The tolerance of each linear solve. Default: `"eisenstat_walker"` in load steps, `{"fixed": 1e-8}` with inertia.
+    pub forcing: Option<Forcing>,
     /// Deprecated, and read for one release: it has no effect. All numbers are in double precision.
     pub precision: Option<Precision>,
     /// Maximum number of iterations of one linear solve, 1 to 1000000. Default 2000.
@@ -64,9 +64,9 @@ pub enum Precision {
 
 impl Default for Krylov {
     fn default() -> Self {
-        let NewtonSettings { krylov, forcing, max_krylov_iterations, .. } = NewtonSettings::default();
+        let NewtonSettings { krylov, max_krylov_iterations, .. } = NewtonSettings::default();
         let (preconditioner, max_iterations) = (Preconditioning::default(), max_krylov_iterations as u32);
-        Self { method: krylov, preconditioner, forcing, precision: None, max_iterations }
+        Self { method: krylov, preconditioner, forcing: None, precision: None, max_iterations }
     }
 }
 
@@ -85,10 +85,7 @@ impl Solver {
                 problems.require(unsymmetric.is_none(), "solver.krylov.method", "\"conjugate_gradient\"", allowed);
             }
         }
-        let absent = self.krylov.preconditioner == Preconditioning::Direct && !Preconditioning::HAS_DIRECT;
-        let allowed = "this program was built without it: build with `--features direct`, or use \"automatic\"";
-        problems.require(!absent, "solver.krylov.preconditioner", "\"direct\"", allowed);
-        if let Forcing::Fixed(tolerance) = self.krylov.forcing {
+        if let Some(Forcing::Fixed(tolerance)) = self.krylov.forcing {
             problems.between("solver.krylov.forcing.fixed", tolerance, 1e-15, 0.9);
         }
     }

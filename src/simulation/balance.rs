@@ -3,15 +3,15 @@
 use super::{InitialGuess, Simulation, StepError};
 use crate::approximation::ShapeFunction;
 use crate::material::Law;
-use crate::mechanics::check::direction;
 use crate::mechanics::loads::PrescribedDof;
 use crate::mechanics::path::OnPath;
 use crate::mechanics::residual::{Equilibrium, Inadmissible};
 use crate::mechanics::rigid::loose;
 use crate::mechanics::sweep::Supports;
 use crate::mechanics::transfer::Nodal;
+use crate::mechanics::trial::Trial;
 use crate::pooled::Pooled;
-use crate::solver::{NewtonError, NewtonFailure, NewtonReport, newton};
+use crate::solver::{NewtonError, NewtonFailure, NewtonReport, Saddle, newton};
 use crate::tensor::Vector;
 
 /// The converged solution of the force balance.
@@ -19,6 +19,8 @@ pub(super) struct Balance<'a, const D: usize, L> {
     pub equilibrium: Equilibrium<'a, D, L>,
     /// φ_n + θ Δφ
     pub phi: Pooled<Vector<f64, D>>,
+    /// The dilatations of averaged cells, in the mixed form: at t_n, and with φ_n + θ Δφ. Otherwise empty.
+    pub dilatation: [Vec<f64>; 2],
     pub newton: NewtonReport,
     /// The argument of the load curves at the solution: the time, or λ on an equilibrium path.
     pub load: f64,
@@ -49,7 +51,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let theta = scheme.instant();
         let under = |load| {
             let equilibrium = self.equilibrium(supports, nodal, prescribed, scheme.balance(dt), load);
-            Equilibrium { stop: self.settings.stop.as_ref(), ..equilibrium }
+            Equilibrium { stop: self.settings.stop.as_ref(), mixed: self.is_mixed(), ..equilibrium }
         };
         let mut load = self.load_of_balance();
         let mut equilibrium = under(load);
@@ -58,12 +60,13 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             phi[dof.node][dof.component] = theta * dof.step.increment;
         }
         phi.iter_mut().zip(&nodal.motion).for_each(|(phi, before)| *phi += before);
-        let (mut preconditioner, x) = (self.preconditioner().0.anew::<D>(), bytemuck::cast_slice_mut(&mut phi));
-        let mut straight = None;
+        let mut preconditioner = self.preconditioner().0.anew::<D>();
+        let (mut straight, mut dilatation) = (None, [Vec::new(), Vec::new()]);
         let newton = if scheme.follows_path() && !self.history.resets_grid() {
             let start = under(self.load());
             let force = |load| under(load).free_external_force(&nodal.motion);
             let path = OnPath::new(self.path, &start, &force, &self.history.rate, dt)?;
+            let x = bytemuck::cast_slice_mut(&mut phi);
             let report = newton(&path, &mut *preconditioner, x, settings, supports.pool())?;
             load = path.load(&phi);
             straight = Some(path.straight(&phi));
@@ -73,11 +76,21 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             equilibrium = under(load);
             report
         } else {
-            newton(&equilibrium, &mut *preconditioner, x, settings, supports.pool())
-                .map_err(|error| self.explained(error, &equilibrium, supports))?
+            if let Some(cells) = equilibrium.terms.averaged_cells().filter(|_| equilibrium.mixed) {
+                dilatation[0] = cells.unknowns(&self.particles);
+                preconditioner = Box::new(Saddle::<D>::over(preconditioner));
+            }
+            let nodal: &[f64] = bytemuck::cast_slice(&phi);
+            let mut x = supports.pool().collect(nodal.iter().chain(&dilatation[0]).copied());
+            let report = newton(&equilibrium, &mut *preconditioner, &mut x, settings, supports.pool())
+                .map_err(|error| self.explained(error, &equilibrium, supports))?;
+            let at = equilibrium.trial(&x);
+            phi.copy_from_slice(at.dphi);
+            dilatation[1] = at.dilatation.to_vec();
+            report
         };
         equilibrium.unknowns.followers.extend(&mut phi);
-        Ok(Balance { equilibrium, phi, newton, load, straight })
+        Ok(Balance { equilibrium, phi, dilatation, newton, load, straight })
     }
 
     /// The Δφ that Newton's method starts from.
@@ -115,10 +128,10 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     pub(super) fn check_tangent(
         &self,
         equilibrium: &Equilibrium<'_, D, L>,
-        dphi: &[Vector<f64, D>],
+        at: Trial<'_, f64, D>,
     ) -> Result<(), StepError> {
         if self.settings.check_tangent.is_some_and(|every| self.clock.steps().is_multiple_of(every.get())) {
-            equilibrium.check_tangent(dphi, &direction(dphi.len(), self.clock.steps()))?;
+            equilibrium.check_tangent_at(at, self.clock.steps())?;
         }
         Ok(())
     }

@@ -1,27 +1,22 @@
 //! The choice of the preconditioner. The thresholds were measured on bodies (`docs/src/choosing.md`).
 
 use super::Simulation;
-use crate::approximation::ShapeFunction;
 use crate::material::{Law, PLASTIC_STRAIN, p_wave_modulus};
 use crate::mechanics::schemes::LONG_STEPS;
 use crate::particles::Body;
-use crate::solver::Preconditioning;
+use crate::solver::{Krylov, Preconditioning};
 
 /// Above this ratio of the volumetric stiffness to Λ + 2G, a body is nearly incompressible, and multigrid is the default preconditioner.
 /// The ratio is about that of ν = 0.4998: at 0.4999, no step is found with block-Jacobi.
 const ISOCHORIC: f64 = 0.999;
 
-/// Numbers of particles in 1D, 2D and 3D from which on multigrid was faster than block-Jacobi. Block-Jacobi serves splines better: in 3D
-/// multigrid was not faster with half a million particles.
-const MANY: [usize; 3] = [500, 10_000, 50_000];
-const MANY_OF_SPLINES: [usize; 3] = [500, 20_000, usize::MAX];
+/// Above this ratio, the dilatations of averaged cells are unknowns of their own. The ratio is about that of ν = 0.45.
+const NEARLY_INCOMPRESSIBLE: f64 = 0.8;
 
-/// Numbers of particles in 1D, 2D and 3D up to which a direct solve is taken, in programs that have it. It was the fastest in beams, and no
-/// slower than the alternative in blocks. In 3D it never was.
-const FEW: [usize; 3] = [usize::MAX, 20_000, 0];
-const FEW_OF_SPLINES: [usize; 3] = [usize::MAX, 50_000, 0];
+/// Numbers of particles in 1D, 2D and 3D from which on multigrid was faster than block-Jacobi in long steps with inertia.
+const MANY: [usize; 3] = [500, 20_000, 50_000];
 
-impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
+impl<const D: usize, L: Law, A> Simulation<D, L, A> {
     /// The preconditioner of the linear systems, and the reason for the choice.
     ///
     /// ```
@@ -34,40 +29,37 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn preconditioner(&self) -> (Preconditioning, &'static str) {
-        match self.settings.preconditioner {
-            Preconditioning::Automatic => self.best_preconditioner(),
-            Preconditioning::Direct if !Preconditioning::HAS_DIRECT => {
-                (Preconditioning::BlockJacobi, "this program was built without the feature `direct`")
-            }
-            asked => (asked, "it was asked for"),
-        }
-    }
-
-    fn best_preconditioner(&self) -> (Preconditioning, &'static str) {
-        use Preconditioning::{BlockJacobi, Direct, Multigrid};
-        let particles = self.particles.len();
-        // Block-Jacobi is more effective for B-splines than for other functions of equal width.
-        let splines = self.approximation.pieces().degree > 1;
-        let (few, many) = if splines { (FEW_OF_SPLINES, MANY_OF_SPLINES) } else { (FEW, MANY) };
-        if self.settings.scheme.follows_path() {
-            (Multigrid, "restarts lose what few iterations keep")
+        use Preconditioning::{Automatic, BlockJacobi, Multigrid};
+        let asked = self.settings.preconditioner;
+        if asked != Automatic {
+            (asked, "it was asked for")
+        } else if self.is_mixed() {
+            (Multigrid, "for the motions; a Schur complement for the pressures of averaged cells")
+        } else if !self.settings.scheme.has_inertia() {
+            (Multigrid, "there is no inertia")
         } else if !self.takes_long_steps() {
             (BlockJacobi, "inertia dominates")
         } else if self.has_internal_variable(PLASTIC_STRAIN) {
             // Near a limit load, multigrid takes a fourth to a sixtieth of the iterations (`docs/src/tutorial/plasticity.md`).
             (Multigrid, "the body may flow")
-        } else if Preconditioning::HAS_DIRECT && particles <= few[D - 1] {
-            (Direct, "few particles, and inertia does not dominate")
-        } else if self.bodies.iter().any(hardly_changes_volume) {
+        } else if self.bodies.iter().any(|body| stiffness_ratio(body) > ISOCHORIC) {
             (Multigrid, "a body hardly changes its volume")
-        } else if D == 3 && self.settings.aggregation && self.approximation.pieces().degree == 3 {
-            // Block-Jacobi takes up to 30 times the iterations (`scenes/block_static.json`).
-            (Multigrid, "outer coefficients follow cubic polynomials")
-        } else if particles >= many[D - 1] {
+        } else if self.particles.len() >= MANY[D - 1] {
             (Multigrid, "many particles, and inertia does not dominate")
         } else {
-            (BlockJacobi, "faster for so many particles and these functions")
+            (BlockJacobi, "few particles")
         }
+    }
+
+    /// Whether the dilatations of averaged cells are unknowns of their own: in long steps of a nearly incompressible body, unless the scene
+    /// asks for a solver that needs motions alone.
+    pub(crate) fn is_mixed(&self) -> bool {
+        let settings = &self.settings;
+        let solver = matches!(settings.preconditioner, Preconditioning::Automatic | Preconditioning::Multigrid)
+            && settings.newton.krylov != Krylov::ConjugateGradient
+            && !settings.scheme.follows_path();
+        let stiff = |body: &Body<L>| body.averages() && stiffness_ratio(body) > NEARLY_INCOMPRESSIBLE;
+        solver && self.takes_long_steps() && self.bodies.iter().any(stiff)
     }
 
     /// Whether inertia does not dominate the steps: load steps, and steps at large Courant numbers.
@@ -78,7 +70,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     }
 }
 
-fn hardly_changes_volume<L: Law>(body: &Body<L>) -> bool {
-    let volumetric = body.response::<f64>(0.0).map_or(0.0, |of| of.stiffness);
-    volumetric > ISOCHORIC * p_wave_modulus(&body.law)
+/// The volumetric stiffness over Λ + 2G.
+fn stiffness_ratio<L: Law>(body: &Body<L>) -> f64 {
+    body.response::<f64>(0.0).map_or(0.0, |of| of.stiffness) / p_wave_modulus(&body.law)
 }

@@ -7,6 +7,7 @@ use crate::approximation::ShapeFunction;
 use crate::material::Law;
 use crate::mechanics::sweep::Supports;
 use crate::mechanics::transfer::{Nodal, Update};
+use crate::mechanics::trial::Trial;
 use crate::mechanics::unknowns::Unknowns;
 use crate::phases::Phase;
 use crate::solver::NewtonReport;
@@ -50,19 +51,24 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let nodal = projected.with_prescribed(&prescribed).extended(&Unknowns::new(&supports, &prescribed));
         watch.lap(Phase::Projection, supports.passes());
 
-        let Balance { equilibrium, phi, newton, load, straight } = self.balance(&supports, &nodal, &prescribed)?;
+        let Balance { equilibrium, phi, dilatation: [before, mut after], newton, load, straight } =
+            self.balance(&supports, &nodal, &prescribed)?;
         watch.lap(Phase::Newton, supports.passes());
-        self.check_tangent(&equilibrium, &phi)?;
+        self.check_tangent(&equilibrium, Trial { dphi: &phi, dilatation: &after })?;
         // Forces are in balance at t_n + θ Δt. The motion is extrapolated to t_{n+1}.
         let (mut dphi, theta) = (phi, scheme.instant());
         dphi.iter_mut().zip(nodal.moved(nodes.len())).for_each(|(dphi, before)| *dphi = (*dphi - before) / theta);
+        if theta < 1.0 {
+            // Dilatations that are extrapolated, too, would drift from the motion.
+            after.clear();
+        }
         mutant!("step: Δφ is the motion to the balance, not to the end": { dphi.iter_mut().for_each(|dphi| *dphi *= theta); });
 
         let update = Update::new(&scheme.end(dt), &projected, &nodal, &prescribed, self.settings.wall_update, &dphi);
-        let mut update = update.extended(&nodal, &equilibrium.unknowns);
+        let mut update = update.with_dilatation(after).extended(&nodal, &equilibrium.unknowns);
         let error = self.local_error(&update, &supports, dt, &newton)?;
         self.smooth_and_check(&mut update, &supports, &nodal)?;
-        let (reactions, work, dissipated) = self.reactions_and_work(&equilibrium, &dphi, &update)?;
+        let (reactions, work, dissipated) = self.reactions_and_work(&equilibrium, &dphi, &before, &update)?;
 
         // Nothing fails from here on.
         let (reset, feels_wall) = (self.history.resets_grid(), self.feels_wall(&prescribed));

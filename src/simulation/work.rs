@@ -7,6 +7,7 @@ use crate::mechanics::residual::Equilibrium;
 use crate::mechanics::schemes::Alphas;
 use crate::mechanics::terms::{self, Role};
 use crate::mechanics::transfer::Update;
+use crate::mechanics::trial::Trial;
 use crate::pooled::Pooled;
 use crate::tensor::Vector;
 
@@ -14,11 +15,13 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// The reactions, the work of the step, and the energy dissipated by damping.
     ///
     /// A reaction is the force at t_{n+1} plus J/Δt, with J the impulse, summed over a prescribed condition. The work of all external
-    /// forces, including the reactions of moving walls, is Σ [½ (f_n + f_{n+1}) + J/Δt]·Δφ.
+    /// forces, including the reactions of moving walls, is Σ [½ (f_n + f_{n+1}) + J/Δt]·Δφ. In the mixed form, `dilatation` is that of the cells
+    /// at t_n.
     pub(super) fn reactions_and_work(
         &self,
         balanced: &Equilibrium<'_, D, L>,
         dphi: &[Vector<f64, D>],
+        dilatation: &[f64],
         update: &Update<'_, D>,
     ) -> Result<(Vec<Reaction<D>>, f64, f64), StepError> {
         let (terms::Step { supports, nodal, .. }, phi) = (balanced.step, update.motion());
@@ -36,7 +39,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let mut work = 0.0;
         if !end.prescribed.is_empty() {
             let mut residual: Pooled<Vector<f64, D>> = supports.field();
-            end.residual_into::<f64>(phi, &mut residual)?;
+            end.residual_into(update.state(), &mut residual)?;
             for (dof, impulse) in end.prescribed.iter().zip(update.impulses()) {
                 let (reaction, blow) = (residual[dof.node][dof.component], impulse / dt);
                 mutant!("step: reactions and work lack the blow of a wall": blow = 0.0);
@@ -53,7 +56,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let start = self.equilibrium(supports, nodal, end.prescribed, Alphas::START, t);
         if end.prescribed.iter().any(|dof| dof.moving) {
             let mut residual: Pooled<Vector<f64, D>> = supports.field();
-            start.residual_into::<f64>(&before, &mut residual)?;
+            start.residual_into(Trial { dphi: &before, dilatation }, &mut residual)?;
             for dof in end.prescribed {
                 work += 0.5 * residual[dof.node][dof.component] * dof.step.increment;
             }

@@ -20,10 +20,10 @@ pub use newton::{
     NewtonIteration, NewtonReport, NewtonSettings, newton,
 };
 pub(crate) use nonnegative::NonnegativeLeastSquares;
-#[cfg(feature = "direct")]
-pub use preconditioner::Direct;
-pub use preconditioner::{BlockJacobi, Identity, LocalForm, Multigrid, Neighbours, Preconditioner, Preconditioning};
-pub(crate) use preconditioner::{direct_bytes, multigrid_bytes};
+pub use preconditioner::{
+    BlockJacobi, Identity, LocalForm, Multigrid, Preconditioner, Preconditioning, PressureCells, Saddle,
+};
+pub(crate) use preconditioner::{multigrid_bytes, saddle_bytes};
 pub use stop::Stop;
 
 use crate::pooled::Pooled;
@@ -76,10 +76,26 @@ pub trait Linearization: LinearOperator {
         None
     }
 
-    /// The sparsity pattern; `None` if it is unknown.
-    fn neighbours(&self) -> Option<Neighbours> {
+    /// The system in motions and pressures, if it is one; `None` if all unknowns are motions.
+    fn saddle_point(&self) -> Option<&dyn SaddlePoint> {
         None
     }
+}
+
+/// The parts of a system in motions u and pressures p of cells, [A Bᵀ; B −C], for preconditioners. A vector of the system has the entries of
+/// the nodes, then those of the cells.
+pub trait SaddlePoint {
+    /// A + Bᵀ γ B
+    fn augmented(&self) -> &dyn Linearization;
+
+    /// `v = B u`, the changes of the cells' volumes.
+    fn volume_changes(&self, u: &[f64], v: &mut [f64]);
+
+    /// `f = Bᵀ p`
+    fn forces(&self, p: &[f64], f: &mut [f64]);
+
+    /// The cells.
+    fn cells(&self) -> PressureCells;
 }
 
 /// A square system R(x) = 0 that is defined for admissible x only. The state is the argument, and nothing is stored between calls.

@@ -107,7 +107,7 @@ fn the_good_scene_is_good_and_defaults_are_the_documented_ones() {
     let all = least.replacen('{', r#"{"approximation": {"bspline": {"degree": 3}},
         "transfer": "flip", "boundary": {}, "prescribed": [], "tractions": [], "pressures": [],
         "solver": {"newton": {"tolerance": 1e-9, "max_iterations": 30},
-                   "krylov": {"method": "automatic", "forcing": {"fixed": 1e-8}, "max_iterations": 2000}},
+                   "krylov": {"method": "automatic", "max_iterations": 2000}},
         "output": {"fields": ["displacement", "velocity", "stress", "jacobian"], "probes": []}, "#, 1)
         .replace(r#""end": 1"#, r#""end": 1, "beta": 0.25, "gamma": 0.5, "lumping": 1, "initial_guess": "zero", "projection": "mass", "wall_update": "literal", "max_halvings": 10"#)
         .replace(r#""density": 1"#, r#""density": 1, "particles_per_cell": 2, "fill": "cut", "layout": "regular""#);

@@ -200,7 +200,8 @@ fn the_krylov_method_is_chosen_by_the_symmetry_of_the_tangent() -> Result<(), Fa
         (pressure, gmres, None, "pressures that follow a surface make the tangent unsymmetric"),
     ] {
         let first = |method: &str| -> Result<_, Failure> {
-            let mut simulation = scene::<2>(COLUMN, &[load, &format!("solver.krylov.method={method}")])?;
+            let jacobi = r#"solver.krylov.preconditioner="block_jacobi""#;
+            let mut simulation = scene::<2>(COLUMN, &[load, jacobi, &format!("solver.krylov.method={method}")])?;
             let history = simulation.advance()?.newton.history;
             Ok((simulation.krylov(), simulation.particles, history))
         };

@@ -5,6 +5,7 @@ use crate::mechanics::loads::ForceField;
 use crate::mechanics::loads::{Loads, PrescribedDof, Reaction};
 use crate::mechanics::residual::{Equilibrium, Inadmissible};
 use crate::mechanics::terms::Step;
+use crate::mechanics::trial::Trial;
 use crate::pooled::Pooled;
 use crate::tensor::Vector;
 use std::sync::Arc;
@@ -69,7 +70,7 @@ impl<const D: usize> LastEquilibrium<D> {
         mutant!("reference: relaxation within a step is carried over": at_start = Equilibrium::new(Step { loads: &self.loads, ..step }, prescribed));
         let still: Pooled<Vector<f64, D>> = supports.field();
         let mut force: Pooled<Vector<f64, D>> = supports.field();
-        at_start.residual_into::<f64>(&still, &mut force)?;
+        at_start.residual_into(Trial::motion(&still), &mut force)?;
         for (number, condition) in conditions.iter().enumerate() {
             let dofs: Vec<_> = prescribed.iter().filter(|dof| dof.owner == number).collect();
             // The moment is m = Σ arm · r.

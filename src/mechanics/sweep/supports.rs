@@ -308,23 +308,6 @@ impl<const D: usize> Supports<D> {
         }
     }
 
-    /// The largest index difference, along any axis, of two nodes that share a particle, or a slightly larger bound.
-    pub(crate) fn reach(&self) -> u32 {
-        if let Way::Tiled(tiled) = &self.way {
-            let widths = tiled.windows().into_iter().flat_map(|(window, _)| window);
-            return widths.max().map_or(0, |width| width.saturating_sub(1) as u32);
-        }
-        let across = |p: usize| {
-            let (mut least, mut most) = ([u32::MAX; D], [0; D]);
-            for (node, ..) in self.of(p) {
-                let index = self.grid.index(self.nodes.ids()[node]);
-                (0..D).for_each(|k| (least[k], most[k]) = (least[k].min(index[k]), most[k].max(index[k])));
-            }
-            (0..D).map(|k| most[k].saturating_sub(least[k])).max().unwrap_or(0)
-        };
-        (0..self.particles()).map(across).max().unwrap_or(0)
-    }
-
     /// Bytes of all arrays.
     ///
     /// Example: [`Self::plain`].

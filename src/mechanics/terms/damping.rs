@@ -3,13 +3,14 @@
 
 use super::inertia::LinearizedMass;
 use super::stress::{LinearizedStress, Stress};
-use super::term::{Linearized, LinearizedTerm, Role, Step, Sum, Term, summed};
+use super::term::{Along, Linearized, LinearizedTerm, Role, Step, Sum, Term, summed};
 use crate::material::Law;
 use crate::mechanics::constitutive::{Inadmissible, Part};
 use crate::mechanics::loads::Rayleigh;
 use crate::mechanics::schemes::Alphas;
 use crate::mechanics::sweep::Number;
 use crate::mechanics::transfer::Nodal;
+use crate::mechanics::trial::Trial;
 use crate::tensor::Vector;
 
 /// (a M̃ + b K_n) v; absent without inertia.
@@ -39,7 +40,7 @@ impl<const D: usize, L: Law> Damping<'_, D, L> {
     fn force(&self, v: &[Vector<f64, D>]) -> Vec<Vector<f64, D>> {
         let mut force = vec![Vector::zeros(); v.len()];
         self.step.mass().add_product(self.rayleigh.mass, v, &mut force);
-        if let Some((mode, add)) = self.stiffness.as_ref().and_then(|of| of.product_at_points(Some(v))) {
+        if let Some((mode, add)) = self.stiffness.as_ref().and_then(|of| of.product_at_points(Along::Field(v, None))) {
             let mut of_stiffness = vec![Vector::<f64, D>::zeros(); v.len()];
             self.step.supports.accumulate(Some(v), mode, &mut of_stiffness, add);
             force.iter_mut().zip(&of_stiffness).for_each(|(force, more)| *force += more * self.rayleigh.stiffness);
@@ -97,7 +98,7 @@ impl<const D: usize, L: Law> Term<D> for Damping<'_, D, L> {
     }
 
     /// α₄ (a M̃ + b K_n)
-    fn linearize(&self, _: &[Vector<f64, D>], _: Part) -> LinearizedTerm<'_, D> {
+    fn linearize(&self, _: Trial<'_, f64, D>, _: Part) -> LinearizedTerm<'_, D> {
         let Rayleigh { mass, stiffness } = self.rayleigh;
         let a4 = self.step.alphas.a4;
         mutant!("damping: the product has the factor of the acceleration": a4 = self.step.alphas.a1);

@@ -1,11 +1,14 @@
 //! Inertia, M̃ a with a = α₁ (Δφ − Δφ̂): eq. 33 with the sign corrected.
 
-use super::term::{AtPoints, BlocksAtPoints, Linearized, LinearizedTerm, ProductAtPoints, Step, Sum, Term, summed};
+use super::term::{
+    Along, AtPoints, BlocksAtPoints, Linearized, LinearizedTerm, ProductAtPoints, Step, Sum, Term, summed,
+};
 use crate::mechanics::constitutive::{Inadmissible, Part};
 use crate::mechanics::mass::Mass;
 use crate::mechanics::schemes::Alphas;
 use crate::mechanics::sweep::{Mode, Number};
 use crate::mechanics::transfer::Nodal;
+use crate::mechanics::trial::Trial;
 use crate::pooled::Pooled;
 use crate::tensor::{Tensor, Vector, identity, scaled};
 
@@ -52,7 +55,7 @@ impl<const D: usize> Term<D> for Inertia<'_, D> {
     }
 
     /// q = (1−ε) m a
-    fn at_points<T: Number>(&self, _: Part, _: &[Vector<T, D>]) -> Option<(Mode, AtPoints<'_, T, D>)> {
+    fn at_points<T: Number>(&self, _: Part, _: Trial<'_, T, D>) -> Option<(Mode, AtPoints<'_, T, D>)> {
         let add: AtPoints<'_, T, D> = Box::new(|group, at, sums| {
             for (lane, &p) in group.particles.iter().enumerate() {
                 let weight = T::lit(self.alphas.a1 * self.mass.consistent(p as usize));
@@ -94,7 +97,7 @@ impl<const D: usize> Term<D> for Inertia<'_, D> {
         }
     }
 
-    fn linearize(&self, _: &[Vector<f64, D>], _: Part) -> LinearizedTerm<'_, D> {
+    fn linearize(&self, _: Trial<'_, f64, D>, _: Part) -> LinearizedTerm<'_, D> {
         Ok(vec![Box::new(LinearizedMass { mass: self.mass, factor: self.alphas.a1 })])
     }
 }
@@ -112,7 +115,7 @@ impl<const D: usize> Linearized<D> for LinearizedMass<'_, D> {
         }
     }
 
-    fn product_at_points(&self, _: Option<&[Vector<f64, D>]>) -> Option<(Mode, ProductAtPoints<'_, D>)> {
+    fn product_at_points(&self, _: Along<'_, D>) -> Option<(Mode, ProductAtPoints<'_, D>)> {
         let add: ProductAtPoints<'_, D> = Box::new(|group, at, sums| {
             for (lane, &p) in group.particles.iter().enumerate() {
                 let weight = self.factor * self.mass.consistent(p as usize);

@@ -13,19 +13,27 @@
 //! ```
 //!
 //! The first part of δσ couples the particles of a cell; the second has the form of a [`ClosedTangent`](crate::material::ClosedTangent).
+//!
+//! In the mixed form, Θ_c is an unknown of its own, with the residual v − Θ_c V_c ([`mixed`](crate::mechanics::mixed)). Newton's method then
+//! meets no stiffness κ of the motion.
 
 use super::term::{
-    AtPoints, BlocksAtPoints, FunctionsAt, Linearized, LinearizedTerm, ProductAtPoints, Step, Sum, Term, summed,
+    Along, AtPoints, BlocksAtPoints, FunctionsAt, Linearized, LinearizedTerm, MixedCell, MixedCells, ProductAtPoints,
+    Step, Sum, Term, summed,
 };
 use crate::lanes::LANES;
 use crate::material::{Law, MaterialState, VolumeResponse};
 use crate::mechanics::constitutive::{AddTo, Form, Product, add_quadratic, product};
 use crate::mechanics::constitutive::{Inadmissible, Part, compose};
-use crate::mechanics::dilatation::{Cells, Member, total};
-use crate::mechanics::sweep::{Mode, Number, Supports};
+use crate::mechanics::dilatation::{Cells, Member, Scale, total};
+use crate::mechanics::sweep::{Mode, Number};
+use crate::mechanics::trial::Trial;
 use crate::pooled::Pooled;
 use crate::scalar::Real;
 use crate::tensor::{Tensor, Vector, cofactor, identity, scaled};
+
+/// The smallest bulk modulus in the choice of γ, relative to G.
+const SOFTEST: f64 = 1e-3;
 
 /// Σ_p V₀ [U(θ_p) − U(J_p)]; absent if no body has mean dilatation.
 pub(crate) struct MeanDilatation<'a, const D: usize, L> {
@@ -77,9 +85,9 @@ impl<'a, const D: usize, L: Law> MeanDilatation<'a, D, L> {
         Local { jacobian: at.jacobian, response: self.response(p, at.j), a }
     }
 
-    fn states<T: Number>(&self, dphi: &[Vector<T, D>]) -> Vec<State<T>> {
+    fn states<T: Number>(&self, at: Trial<'_, T, D>) -> Vec<State<T>> {
         let Step { particles, supports, .. } = self.step;
-        let changes = self.cells.changes(particles, supports, dphi);
+        let changes = self.cells.changes_at(particles, supports, at);
         let state = |((members, volume), change): ((&[_], f64), T)| {
             let (mut stress, mut stiffness) = (T::zero(), T::zero());
             for p in members.iter().map(|member: &Member| member.particle as usize) {
@@ -94,13 +102,38 @@ impl<'a, const D: usize, L: Law> MeanDilatation<'a, D, L> {
     }
 }
 
+impl<const D: usize, L: Law> MeanDilatation<'_, D, L> {
+    /// G/h (v − Θ V_c) of every cell in the mixed form, with Θ from its own unknown; empty in the form of motions alone.
+    pub(super) fn residuals<T: Number>(&self, at: Trial<'_, T, D>) -> Vec<T> {
+        if at.dilatation.is_empty() {
+            return Vec::new();
+        }
+        let Step { particles, supports, .. } = self.step;
+        let of_motion = self.cells.changes(particles, supports, at.dphi);
+        let own = self.cells.changes_at(particles, supports, at);
+        let cells = self.cells.iter().zip(&self.cells.scales).zip(of_motion.into_iter().zip(own));
+        mutant!("mixed: the residual of a cell is that of half its volume": { return cells.map(|(((_, volume), scale), (motion, own))| (motion - own) * T::lit(0.5 * scale.force * volume)).collect(); });
+        cells.map(|(((_, volume), scale), (motion, own))| (motion - own) * T::lit(scale.force * volume)).collect()
+    }
+
+    /// The magnitude of the contributions to [`Self::residuals`].
+    pub(super) fn magnitudes(&self) -> impl Iterator<Item = f64> {
+        self.cells.iter().zip(&self.cells.scales).map(|((_, volume), scale)| 2.0 * scale.force * volume)
+    }
+
+    /// The cells, for the unknowns of the mixed form.
+    pub(super) fn cells(&self) -> &Cells {
+        &self.cells
+    }
+}
+
 impl<const D: usize, L: Law> Term<D> for MeanDilatation<'_, D, L> {
     fn name(&self) -> &'static str {
         "mean dilatation"
     }
 
-    fn at_points<T: Number>(&self, _: Part, dphi: &[Vector<T, D>]) -> Option<(Mode, AtPoints<'_, T, D>)> {
-        let states = self.states(dphi);
+    fn at_points<T: Number>(&self, _: Part, at: Trial<'_, T, D>) -> Option<(Mode, AtPoints<'_, T, D>)> {
+        let states = self.states(at);
         Some((
             Mode::GRADIENT,
             Box::new(move |group, at, sums| {
@@ -121,7 +154,7 @@ impl<const D: usize, L: Law> Term<D> for MeanDilatation<'_, D, L> {
 
     fn energy<T: Number>(&self, dphi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>> {
         let Step { particles, supports, .. } = self.step;
-        let states = self.states(dphi);
+        let states = self.states(Trial::motion(dphi));
         let mut energies = vec![[T::zero(); 2]; particles.len()];
         supports.each_particle(
             dphi,
@@ -136,12 +169,12 @@ impl<const D: usize, L: Law> Term<D> for MeanDilatation<'_, D, L> {
         Some(Ok(summed(energies.into_iter().flatten())))
     }
 
-    fn linearize(&self, dphi: &[Vector<f64, D>], _: Part) -> LinearizedTerm<'_, D> {
+    fn linearize(&self, at: Trial<'_, f64, D>, _: Part) -> LinearizedTerm<'_, D> {
         let supports = self.step.supports;
-        let states = self.states(dphi);
+        let states = self.states(at);
         let (closed, count) = (Form::Closed.rows(D), Form::Closed.rows(D) + 1);
         let mut rows = supports.pool().unspecified(supports.groups() * count, [0.0; LANES]);
-        supports.fill_rows(dphi, count, &mut rows, |group, at, rows| {
+        supports.fill_rows(at.dphi, count, &mut rows, |group, at, rows| {
             rows.fill([0.0; LANES]);
             for (lane, &p) in group.particles.iter().enumerate() {
                 let Some(cell) = self.cells.cell(p) else { continue };
@@ -160,8 +193,14 @@ impl<const D: usize, L: Law> Term<D> for MeanDilatation<'_, D, L> {
                 rows[closed][lane] = weight;
             }
         });
-        let stiffness = states.into_iter().map(|state| state.stiffness).collect();
-        Ok(vec![Box::new(LinearizedMean { cells: &self.cells, supports, rows, stiffness })])
+        let stiffness: Vec<f64> = states.iter().map(|state| state.stiffness).collect();
+        let mut linearized = LinearizedMean { of: self, rows, stiffness, mixed: None };
+        if !at.dilatation.is_empty() {
+            let cells = linearized.mixed_cells(&states);
+            linearized.stiffness = cells.iter().map(|cell| cell.augmented).collect();
+            linearized.mixed = Some(cells);
+        }
+        Ok(vec![Box::new(linearized)])
     }
 }
 
@@ -171,16 +210,17 @@ pub(crate) const fn linearized_rows(dimension: usize) -> usize {
 }
 
 /// The linearised δσ: `stiffness` couples the particles of a cell, and `rows` is the local part.
-struct LinearizedMean<'a, const D: usize> {
-    cells: &'a Cells,
-    supports: &'a Supports<D>,
+struct LinearizedMean<'a, const D: usize, L> {
+    of: &'a MeanDilatation<'a, D, L>,
     /// A, zeros, κ, q, and V₀ J.
     rows: Pooled<[f64; LANES]>,
-    /// k
+    /// k; in the mixed form γ.
     stiffness: Vec<f64>,
+    /// The cells of the mixed form.
+    mixed: Option<Vec<MixedCell<D>>>,
 }
 
-impl<const D: usize> LinearizedMean<'_, D> {
+impl<const D: usize, L: Law> LinearizedMean<'_, D, L> {
     /// A, zeros, κ and q of a group, and V₀ J.
     fn of_group(&self, group: usize) -> (&[[f64; LANES]], &[f64; LANES]) {
         let count = linearized_rows(D);
@@ -188,10 +228,83 @@ impl<const D: usize> LinearizedMean<'_, D> {
         (&rows[..count - 1], &rows[count - 1])
     }
 
-    /// k δv of every cell, with δv = Σ V₀ J A : ∇u.
-    fn coupling(&self, u: &[Vector<f64, D>]) -> Vec<f64> {
-        let mut grown = self.supports.pool().unspecified(self.supports.groups(), [0.0; LANES]);
-        self.supports.fill_rows(u, 1, &mut grown, |group, at, grown| {
+    /// V₀ J A of a member, which is ∂v/∂(∇u).
+    fn pull(&self, member: &Member) -> Tensor<f64, D> {
+        let (group, lane) = (member.slot as usize / LANES, member.slot as usize % LANES);
+        let (rows, weight) = self.of_group(group);
+        Tensor::from_fn(|i, k| rows[i * D + k][lane] * weight[lane])
+    }
+
+    /// The cells of the mixed form, with γ = k₀/v and k₀ = κ G/(κ + G).
+    fn mixed_cells(&self, states: &[State<f64>]) -> Vec<MixedCell<D>> {
+        let Step { particles, supports, .. } = self.of.step;
+        let (grid, reference) = (supports.grid(), particles.reference());
+        let cell = |(members, reference_volume): (&[Member], f64), state: &State<f64>, scale: &Scale| {
+            let volume = (1.0 + state.change) * reference_volume;
+            let (mut pull, mut centroid) = (Tensor::zeros(), Vector::zeros());
+            for member in members {
+                let p = member.particle as usize;
+                pull += self.pull(member);
+                centroid += reference.position[p] * (reference.volume(p) / reference_volume);
+            }
+            let bulk = (state.stiffness * volume).max(SOFTEST * scale.shear);
+            MixedCell {
+                index: grid.cell(&reference.position[members[0].particle as usize]).unwrap_or([0; D]),
+                centroid,
+                volume,
+                pull,
+                stiffness: state.stiffness,
+                augmented: bulk * scale.shear / (bulk + scale.shear) / volume,
+                scale: *scale,
+                reference_volume,
+            }
+        };
+        let all = self.of.cells.iter().zip(states).zip(&self.of.cells.scales);
+        all.map(|((members, state), scale)| cell(members, state, scale)).collect()
+    }
+
+    /// k δp, or k δv with δv = Σ V₀ J A : ∇u.
+    fn coupling(&self, along: Along<'_, D>) -> Vec<f64> {
+        let volumes = match along {
+            Along::Field(_, Some(pressures)) => return pressures.to_vec(),
+            Along::Field(u, None) => self.volume_changes(u),
+            Along::Gradient(gradient) => {
+                let sum = |members: &[Member]| members.iter().map(|member| self.pull(member).dot(gradient)).sum();
+                self.of.cells.iter().map(|(members, _)| sum(members)).collect()
+            }
+        };
+        volumes.iter().zip(&self.stiffness).map(|(v, k): (&f64, _)| k * v).collect()
+    }
+
+    /// Calls `visit` with each cell, each node that moves it, and b = ∂v/∂u of the node.
+    fn each_pull(
+        &self,
+        functions: &FunctionsAt<'_, D>,
+        nodes: usize,
+        mut visit: impl FnMut(usize, usize, Vector<f64, D>),
+    ) {
+        let (mut sums, mut touched) = (vec![Vector::<f64, D>::zeros(); nodes], Vec::new());
+        for (cell, (members, _)) in self.of.cells.iter().enumerate() {
+            for member in members {
+                let a = self.pull(member);
+                for (node, function) in functions(member.particle as usize) {
+                    sums[node] += Vector::from_fn(|i, _| (a * function.gradient[i])[i]);
+                    touched.push(node);
+                }
+            }
+            for node in touched.drain(..) {
+                let b = std::mem::replace(&mut sums[node], Vector::zeros());
+                if b.norm_squared() > 0.0 {
+                    visit(cell, node, b);
+                }
+            }
+        }
+    }
+
+    fn volume_changes(&self, u: &[Vector<f64, D>]) -> Vec<f64> {
+        let supports = self.of.step.supports;
+        let mut grown = supports.pool().unspecified(supports.groups(), [0.0; LANES]);
+        supports.fill_rows(u, 1, &mut grown, |group, at, grown| {
             let (a, weight) = self.of_group(group.number);
             let mut sum = [0.0; LANES];
             for (a, l) in a.iter().zip(at.gradient.as_flattened()) {
@@ -200,16 +313,30 @@ impl<const D: usize> LinearizedMean<'_, D> {
             grown[0] = std::array::from_fn(|lane| sum[lane] * weight[lane]);
         });
         let slot = |slot: u32| grown[slot as usize / LANES][slot as usize % LANES];
-        let sum = |((members, _), k): ((&[Member], f64), &f64)| {
-            k * members.iter().map(|member| slot(member.slot)).sum::<f64>()
-        };
-        self.cells.iter().zip(&self.stiffness).map(sum).collect()
+        let sum = |(members, _): (&[Member], f64)| members.iter().map(|member| slot(member.slot)).sum();
+        self.of.cells.iter().map(sum).collect()
     }
 }
 
-impl<const D: usize> Linearized<D> for LinearizedMean<'_, D> {
-    fn product_at_points(&self, u: Option<&[Vector<f64, D>]>) -> Option<(Mode, ProductAtPoints<'_, D>)> {
-        let coupling = self.coupling(u?);
+impl<const D: usize, L: Law> MixedCells<D> for LinearizedMean<'_, D, L> {
+    fn volume_changes(&self, u: &[Vector<f64, D>]) -> Vec<f64> {
+        Self::volume_changes(self, u)
+    }
+
+    fn softness(&self, functions: &FunctionsAt<'_, D>, inverse: &[Tensor<f64, D>]) -> Vec<f64> {
+        let mut softness = vec![0.0; self.stiffness.len()];
+        self.each_pull(functions, inverse.len(), |cell, node, b| softness[cell] += b.dot(&(inverse[node] * b)));
+        softness
+    }
+
+    fn cells(&self) -> &[MixedCell<D>] {
+        self.mixed.as_deref().unwrap_or_default()
+    }
+}
+
+impl<const D: usize, L: Law> Linearized<D> for LinearizedMean<'_, D, L> {
+    fn product_at_points(&self, along: Along<'_, D>) -> Option<(Mode, ProductAtPoints<'_, D>)> {
+        let coupling = self.coupling(along);
         Some((
             Mode::GRADIENT,
             Box::new(move |group, at, sums| {
@@ -217,7 +344,7 @@ impl<const D: usize> Linearized<D> for LinearizedMean<'_, D> {
                 let (l, out) = (at.gradient.as_flattened(), sums.gradient.as_flattened_mut());
                 let mut pulls = [0.0; LANES];
                 for (lane, &p) in group.particles.iter().enumerate() {
-                    pulls[lane] = self.cells.cell(p).map_or(0.0, |cell| coupling[cell] * weight[lane]);
+                    pulls[lane] = self.of.cells.cell(p).map_or(0.0, |cell| coupling[cell] * weight[lane]);
                     mutant!("mean dilatation: the product lacks the coupling within a cell": { pulls[lane] = 0.0; });
                 }
                 product(D, Product { form: Form::Closed, rows, l, out });
@@ -237,27 +364,12 @@ impl<const D: usize> Linearized<D> for LinearizedMean<'_, D> {
 
     /// Σ_c k b_I ⊗ b_I with b_I = ∂v/∂Δφ_I: the contribution of the coupling.
     fn add_blocks_of_functions(&self, functions: &FunctionsAt<'_, D>, blocks: &mut [Tensor<f64, D>]) {
-        let mut sums = vec![Vector::<f64, D>::zeros(); blocks.len()];
-        let mut touched = Vec::new();
-        for ((members, _), k) in self.cells.iter().zip(&self.stiffness) {
-            for member in members {
-                let (group, lane) = (member.slot as usize / LANES, member.slot as usize % LANES);
-                let (rows, weight) = self.of_group(group);
-                let a = Tensor::<f64, D>::from_fn(|i, k| rows[i * D + k][lane] * weight[lane]);
-                for (node, function) in functions(member.particle as usize) {
-                    sums[node] += Vector::from_fn(|i, _| (a * function.gradient[i])[i]);
-                    touched.push(node);
-                }
-            }
-            for node in touched.drain(..) {
-                let b = std::mem::replace(&mut sums[node], Vector::zeros());
-                blocks[node] += b * b.transpose() * *k;
-            }
-        }
+        self.each_pull(functions, blocks.len(), |cell, node, b| {
+            blocks[node] += b * b.transpose() * self.stiffness[cell];
+        });
     }
 
-    /// Shape functions may change their nodes at the middle of a cell. Two particles of one cell then see nodes that are one apart.
-    fn reach(&self) -> u32 {
-        1
+    fn mixed(&self) -> Option<&dyn MixedCells<D>> {
+        self.mixed.is_some().then_some(self)
     }
 }

@@ -20,7 +20,7 @@ mod term;
 
 pub(crate) use mean_dilatation::linearized_rows;
 pub(crate) use planned::planned;
-pub(crate) use term::Linearized;
+pub(crate) use term::{Along, Linearized, MixedCell, MixedCells};
 pub use term::{AtPoints, Piece, Role, Step, Sum};
 
 use damping::Damping;
@@ -33,7 +33,9 @@ use term::{LinearizedTerm, Term};
 
 use crate::material::Law;
 use crate::mechanics::constitutive::{Inadmissible, Part};
+use crate::mechanics::dilatation::Cells;
 use crate::mechanics::sweep::{Mode, Number};
+use crate::mechanics::trial::Trial;
 use crate::tensor::Vector;
 
 /// A term of any type.
@@ -110,9 +112,9 @@ impl<'a, const D: usize, L: Law> Terms<'a, D, L> {
         &self,
         picked: impl Fn(&str, Role) -> bool,
         part: Part,
-        dphi: &[Vector<T, D>],
+        at: Trial<'_, T, D>,
     ) -> Vec<(Mode, AtPoints<'_, T, D>)> {
-        self.picked(picked).filter_map(|any| of_term!(any, term => term.at_points(part, dphi))).collect()
+        self.picked(picked).filter_map(|any| of_term!(any, term => term.at_points(part, at))).collect()
     }
 
     /// The sum of all energies; `None` if a term has no potential.
@@ -142,12 +144,35 @@ impl<'a, const D: usize, L: Law> Terms<'a, D, L> {
         self.0.iter().try_for_each(|any| of_term!(any, term => term.add_sensitivity(dphi, out)))
     }
 
+    /// The cells with mean dilatation; `None` if there are none.
+    pub(crate) fn averaged_cells(&self) -> Option<&Cells> {
+        self.mean_dilatation().map(MeanDilatation::cells)
+    }
+
+    /// The residuals of the cells in the mixed form, if `picked` selects mean dilatation.
+    pub(crate) fn cell_residuals<T: Number>(&self, picked: impl Fn(&str, Role) -> bool, at: Trial<'_, T, D>) -> Vec<T> {
+        let mean = self.mean_dilatation().filter(|mean| picked(mean.name(), mean.role()));
+        mean.map_or_else(Vec::new, |mean| mean.residuals(at))
+    }
+
+    /// The magnitudes of the contributions to the residuals of the cells.
+    pub(crate) fn cell_magnitudes(&self) -> Vec<f64> {
+        self.mean_dilatation().into_iter().flat_map(MeanDilatation::magnitudes).collect()
+    }
+
+    fn mean_dilatation(&self) -> Option<&MeanDilatation<'a, D, L>> {
+        self.0.iter().find_map(|any| match any {
+            AnyTerm::MeanDilatation(mean) => Some(mean),
+            _ => None,
+        })
+    }
+
     /// Linearises all terms, or one piece.
-    pub(crate) fn linearize(&self, piece: Option<Piece>, dphi: &[Vector<f64, D>]) -> LinearizedTerm<'_, D> {
+    pub(crate) fn linearize(&self, piece: Option<Piece>, at: Trial<'_, f64, D>) -> LinearizedTerm<'_, D> {
         let part = piece.map_or(Part::Whole, |piece| piece.part);
         let mut all = Vec::new();
         for any in self.picked(|name, _| piece.is_none_or(|piece| piece.term == name)) {
-            all.extend(of_term!(any, term => term.linearize(dphi, part))?);
+            all.extend(of_term!(any, term => term.linearize(at, part))?);
         }
         Ok(all)
     }

@@ -4,6 +4,7 @@ use super::term::{FunctionsAt, Linearized, LinearizedTerm, Role, Step, Sum, Term
 use crate::mechanics::constitutive::{Inadmissible, Part, compose};
 use crate::mechanics::loads::PressurePoint;
 use crate::mechanics::sweep::{Number, Supports};
+use crate::mechanics::trial::Trial;
 use crate::particles::Particles;
 use crate::tensor::{Deformation, Tensor, Vector, cofactor, contract, identity};
 
@@ -53,7 +54,7 @@ impl<const D: usize> Term<D> for Pressure<'_, D> {
         }
     }
 
-    fn linearize(&self, dphi: &[Vector<f64, D>], _: Part) -> LinearizedTerm<'_, D> {
+    fn linearize(&self, Trial { dphi, .. }: Trial<'_, f64, D>, _: Part) -> LinearizedTerm<'_, D> {
         let linearize = |point: &PressurePoint<D>| {
             let (p, h_r) = (point.particle, &self.particles.reference().displacement_gradient[point.particle]);
             let at = Deformation::new(compose(&self.supports.gradient_at(p, dphi), h_r));

@@ -1,11 +1,14 @@
 //! The internal force Σ_p V₀ F S ∇N (eq. 17), and its tangent, geometric and material (eqs. 34, 38).
 
-use super::term::{AtPoints, BlocksAtPoints, Linearized, LinearizedTerm, ProductAtPoints, Step, Sum, Term, summed};
+use super::term::{
+    Along, AtPoints, BlocksAtPoints, Linearized, LinearizedTerm, ProductAtPoints, Step, Sum, Term, summed,
+};
 use crate::lanes::LANES;
 use crate::material::Law;
 use crate::mechanics::constitutive::{AddTo, Form, Laws, Product, add_quadratic, product};
 use crate::mechanics::constitutive::{Inadmissible, Part, compose};
 use crate::mechanics::sweep::{Mode, Number, Supports, Weights};
+use crate::mechanics::trial::Trial;
 use crate::parallel::First;
 use crate::pooled::Pooled;
 use crate::tensor::{Tensor, Vector, identity};
@@ -52,7 +55,7 @@ impl<const D: usize, L: Law> Term<D> for Stress<'_, D, L> {
         &[(Part::Geometric, "geometric"), (Part::Material, "material")]
     }
 
-    fn at_points<T: Number>(&self, part: Part, _: &[Vector<T, D>]) -> Option<(Mode, AtPoints<'_, T, D>)> {
+    fn at_points<T: Number>(&self, part: Part, _: Trial<'_, T, D>) -> Option<(Mode, AtPoints<'_, T, D>)> {
         Some((Mode::GRADIENT, Box::new(self.laws.stresses(part))))
     }
 
@@ -88,8 +91,8 @@ impl<const D: usize, L: Law> Term<D> for Stress<'_, D, L> {
         })
     }
 
-    fn linearize(&self, dphi: &[Vector<f64, D>], part: Part) -> LinearizedTerm<'_, D> {
-        Ok(vec![Box::new(self.linearized(dphi, part)?)])
+    fn linearize(&self, at: Trial<'_, f64, D>, part: Part) -> LinearizedTerm<'_, D> {
+        Ok(vec![Box::new(self.linearized(at.dphi, part)?)])
     }
 }
 
@@ -113,7 +116,7 @@ impl LinearizedStress {
 }
 
 impl<const D: usize> Linearized<D> for LinearizedStress {
-    fn product_at_points(&self, _: Option<&[Vector<f64, D>]>) -> Option<(Mode, ProductAtPoints<'_, D>)> {
+    fn product_at_points(&self, _: Along<'_, D>) -> Option<(Mode, ProductAtPoints<'_, D>)> {
         Some((
             Mode::GRADIENT,
             Box::new(|group, at, sums| {

@@ -1,11 +1,13 @@
 //! A term of the residual, its linearisation, and the data that terms are built from.
 
 use crate::mechanics::constitutive::{Inadmissible, Part};
+use crate::mechanics::dilatation::Scale;
 use crate::mechanics::loads::Loads;
 use crate::mechanics::mass::Mass;
 use crate::mechanics::schemes::Alphas;
 use crate::mechanics::sweep::{At, Group, Mode, Number, Quadratic, Supports};
 use crate::mechanics::transfer::Nodal;
+use crate::mechanics::trial::Trial;
 use crate::mechanics::unknowns::Function;
 use crate::particles::{Body, Particles};
 use crate::tensor::{Tensor, Vector};
@@ -47,6 +49,15 @@ impl<'a, const D: usize, L> Step<'a, D, L> {
         let Self { particles, supports, nodal, lumping, .. } = *self;
         Mass { particles, supports, lumped: &nodal.mass, lumping }
     }
+}
+
+/// The direction of a product with a linearised term.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Along<'x, const D: usize> {
+    /// A nodal field. If given, changes of the pressures of averaged cells take the place of those that the field causes.
+    Field(&'x [Vector<f64, D>], Option<&'x [f64]>),
+    /// The same gradient at all particles.
+    Gradient(&'x Tensor<f64, D>),
 }
 
 /// The contribution of a term at the particles of a group: adds q and σ to the last argument. The function is chosen once per pass.
@@ -92,9 +103,9 @@ pub(crate) trait Term<const D: usize>: Sync {
     /// Adds the contribution at the nodes.
     fn add_at_nodes<T: Number>(&self, _dphi: &[Vector<T, D>], _out: &mut [Vector<T, D>]) {}
 
-    /// The contribution at the particles at Δφ. Its [`Mode`] says which of u and L it reads, and which of q and σ it writes. Only the
+    /// The contribution at the particles. Its [`Mode`] says which of u and L it reads, and which of q and σ it writes. Only the
     /// occurrences of Δφ in `part` carry derivatives.
-    fn at_points<T: Number>(&self, _part: Part, _dphi: &[Vector<T, D>]) -> Option<(Mode, AtPoints<'_, T, D>)> {
+    fn at_points<T: Number>(&self, _part: Part, _at: Trial<'_, T, D>) -> Option<(Mode, AtPoints<'_, T, D>)> {
         None
     }
 
@@ -115,11 +126,11 @@ pub(crate) trait Term<const D: usize>: Sync {
         Ok(())
     }
 
-    /// Linearises the term at Δφ.
+    /// Linearises the term.
     ///
     /// # Errors
     /// det F ≤ 0 somewhere.
-    fn linearize(&self, _dphi: &[Vector<f64, D>], _part: Part) -> LinearizedTerm<'_, D> {
+    fn linearize(&self, _at: Trial<'_, f64, D>, _part: Part) -> LinearizedTerm<'_, D> {
         Ok(Vec::new())
     }
 }
@@ -129,9 +140,8 @@ pub(crate) trait Linearized<const D: usize>: Sync {
     /// Adds the contribution to the product at the nodes.
     fn add_product_at_nodes(&self, _u: &[Vector<f64, D>], _out: &mut [Vector<f64, D>]) {}
 
-    /// The contribution to the product with `u` at the particles, with its [`Mode`]. `u` is `None` where multigrid asks with unit
-    /// gradients, which come from no nodal field. A term that couples particles then leaves the coupling out.
-    fn product_at_points(&self, _u: Option<&[Vector<f64, D>]>) -> Option<(Mode, ProductAtPoints<'_, D>)> {
+    /// The contribution to a product at the particles, with its [`Mode`].
+    fn product_at_points(&self, _along: Along<'_, D>) -> Option<(Mode, ProductAtPoints<'_, D>)> {
         None
     }
 
@@ -146,10 +156,43 @@ pub(crate) trait Linearized<const D: usize>: Sync {
         None
     }
 
-    /// The reach of the tangent's entries along an axis, beyond that of the shape functions; in nodes.
-    fn reach(&self) -> u32 {
-        0
+    /// The averaged cells whose dilatation is an unknown of its own.
+    fn mixed(&self) -> Option<&dyn MixedCells<D>> {
+        None
     }
+}
+
+/// The linearised equations of averaged cells whose dilatation is an unknown of its own.
+pub(crate) trait MixedCells<const D: usize>: Sync {
+    /// B u, the changes of the cells' volumes.
+    fn volume_changes(&self, u: &[Vector<f64, D>]) -> Vec<f64>;
+
+    /// B_c D⁻¹ B_cᵀ of every cell, for a block-diagonal D⁻¹.
+    fn softness(&self, functions: &FunctionsAt<'_, D>, inverse: &[Tensor<f64, D>]) -> Vec<f64>;
+
+    /// The cells in their order.
+    fn cells(&self) -> &[MixedCell<D>];
+}
+
+/// A cell at one trial state.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct MixedCell<const D: usize> {
+    /// The index of the cell in the grid.
+    pub index: [u32; D],
+    /// The centroid of the particles.
+    pub centroid: Vector<f64, D>,
+    /// v
+    pub volume: f64,
+    /// ∂v/∂(∇u)
+    pub pull: Tensor<f64, D>,
+    /// k = ∂π/∂v
+    pub stiffness: f64,
+    /// γ
+    pub augmented: f64,
+    /// The units of the unknown and of its residual.
+    pub scale: Scale,
+    /// V_c
+    pub reference_volume: f64,
 }
 
 /// Where the work of a term goes.

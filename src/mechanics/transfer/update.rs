@@ -9,6 +9,7 @@ use crate::mechanics::residual::compose;
 use crate::mechanics::schemes::Alphas;
 use crate::mechanics::smoothing::Smoothing;
 use crate::mechanics::sweep::Supports;
+use crate::mechanics::trial::Trial;
 use crate::mechanics::unknowns::Unknowns;
 use crate::particles::{Body, Particles};
 use crate::pooled::{Pool, Pooled};
@@ -68,6 +69,8 @@ pub struct Update<'a, const D: usize> {
     dphi: &'a [Vector<f64, D>],
     /// φ = φ_n + Δφ; `None` right after a grid reset.
     kept: Option<Pooled<Vector<f64, D>>>,
+    /// The dilatations of averaged cells in the mixed form; otherwise empty.
+    dilatation: Vec<f64>,
     /// Δv and Δa of the nodes; empty without inertia.
     delta_velocity: Pooled<Vector<f64, D>>,
     delta_acceleration: Pooled<Vector<f64, D>>,
@@ -118,7 +121,17 @@ impl<'a, const D: usize> Update<'a, D> {
             kept = Some(nodal.motion.pool().collect(sums));
             mutant!("transfer: the end of a step forgets the motion on a kept grid": { kept = Some(nodal.motion.pool().collect(dphi.iter().copied())); });
         }
-        Self { dphi, kept, delta_velocity, delta_acceleration, impulses, smoothed: None }
+        Self { dphi, kept, dilatation: Vec::new(), delta_velocity, delta_acceleration, impulses, smoothed: None }
+    }
+
+    /// The update with dilatations of averaged cells that are unknowns of their own.
+    pub(crate) fn with_dilatation(self, dilatation: Vec<f64>) -> Self {
+        Self { dilatation, ..self }
+    }
+
+    /// The state of the unknowns at the end of the step.
+    pub(crate) fn state(&self) -> Trial<'_, f64, D> {
+        Trial { dphi: self.motion(), dilatation: &self.dilatation }
     }
 
     /// Applies E to the increments, so that outer nodes follow inner nodes that a wall has changed.
@@ -249,7 +262,7 @@ impl<'a, const D: usize> Update<'a, D> {
         let place = |body: &Body<L>| body.law.internal_variables().iter().position(|one| one.name == PLASTIC_STRAIN);
         let plastic_strain: Vec<Option<usize>> = bodies.iter().map(place).collect();
         let (mut plastic, mut yielding) = (0.0, 0.0);
-        particles.dilatation = dilatation::after(particles, bodies, supports, self.motion());
+        particles.dilatation = dilatation::after(particles, bodies, supports, self.state());
         let mut next = Vec::with_capacity(remembered);
         let Particles {
             position, velocity, acceleration, displacement_gradient, volume, memory, body, reference, ..

@@ -161,7 +161,7 @@ impl<E: std::error::Error + 'static> Newton<'_, E> {
     /// Steps 2 to 6, and 8. `None` if the residual is round-off, and the full step does not lower it.
     fn step(&mut self, preconditioner: &mut dyn Preconditioner) -> Result<Option<NewtonIteration>, NewtonFailure<E>> {
         let (iteration, before) = (self.history.iterations.len(), self.residual);
-        let last = self.history.iterations.last().map(|last| (last.forcing, last.ratio));
+        let last = self.history.iterations.last().map(|last| last.ratio);
         let forcing = self.settings.forcing.next(last, self.target / before);
         self.history.counts.linearizations += 1;
         let (d, krylov) = {

@@ -6,25 +6,25 @@ use serde::{Deserialize, Serialize};
 use std::fmt::{Display, Formatter};
 
 /// Restart of GMRES where the scene does not choose one.
-pub(super) const DEFAULT_RESTART: u32 = 30;
+pub(super) const DEFAULT_RESTART: u32 = 50;
 
 /// The Krylov method.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 #[schemars(rename = "Method")]
 pub enum Krylov {
-    /// Conjugate gradients where the tangent is symmetric, GMRES(30) where it is not. Pressures and some laws make it unsymmetric.
+    /// Conjugate gradients where the tangent is symmetric, GMRES(50) where it is not. Pressures and some laws make it unsymmetric.
     #[default]
     Automatic,
     /// Restarted GMRES, for any tangent.
     Gmres {
-        /// Basis vectors stored before a restart, 1 to 1000. Default 30.
+        /// Basis vectors stored before a restart, 1 to 1000. Default 50.
         #[serde(default = "Krylov::default_restart")]
         #[schemars(range(min = 1, max = 1000))]
         restart: u32,
     },
     /// Conjugate gradients, for symmetric tangents: not with pressures. If a tangent is not positive definite, the step found until then is
-    /// taken if there is a potential and the step lowers it. Otherwise GMRES(30) solves that system instead.
+    /// taken if there is a potential and the step lowers it. Otherwise GMRES(50) solves that system instead.
     ConjugateGradient,
 }
 
@@ -39,7 +39,7 @@ impl Krylov {
     /// use bfree::solver::Krylov;
     ///
     /// let chosen = [true, false].map(|symmetric| Krylov::Automatic.chosen(symmetric).to_string());
-    /// assert_eq!(chosen, ["conjugate gradients", "GMRES(30)"]);
+    /// assert_eq!(chosen, ["conjugate gradients", "GMRES(50)"]);
     /// // A method that is asked for is used.
     /// assert_eq!(Krylov::Gmres { restart: 50 }.chosen(true), Krylov::Gmres { restart: 50 });
     /// ```

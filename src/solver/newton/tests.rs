@@ -217,12 +217,15 @@ fn forcing_terms_reach_the_same_solution() {
         let settings = NewtonSettings { relative_tolerance: 1e-11, forcing, ..NewtonSettings::default() };
         let report = newton(&problem, &mut u, &settings).unwrap();
         assert!(report.history.iterations.iter().all(|i| i.krylov.relative_residual <= i.forcing));
-        (u, report.history.counts.krylov_iterations)
+        let asked: Vec<f64> = report.history.iterations.iter().map(|i| i.forcing).collect();
+        (u, report.history.counts.krylov_iterations, asked)
     };
-    let (exact, tight) = solve(Forcing::Fixed(1e-10));
-    let (u, loose) = solve(Forcing::EisenstatWalker);
+    let (exact, tight, _) = solve(Forcing::Fixed(1e-10));
+    let (u, loose, asked) = solve(Forcing::EisenstatWalker);
     assert!(u.iter().zip(&exact).all(|(u, v)| (u - v).abs() < 1e-8));
-    assert!(loose < tight, "{loose} {tight}");
+    // On a chain of n springs, conjugate gradients take n iterations to any tolerance.
+    assert!(loose <= tight, "{loose} {tight}");
+    assert!(asked[0] == 0.01 && asked[asked.len() - 1] < 1e-4, "{asked:?}");
 }
 
 #[test]

@@ -1,34 +1,20 @@
 //! Preconditioners: approximate inverses for Krylov methods, one file each.
 
 mod block_jacobi;
-#[cfg(feature = "direct")]
-mod direct;
+mod chebyshev;
 mod multigrid;
+mod saddle;
 
 pub use block_jacobi::BlockJacobi;
-#[cfg(feature = "direct")]
-pub use direct::Direct;
 pub(crate) use multigrid::bytes as multigrid_bytes;
 pub use multigrid::{LocalForm, Multigrid};
+pub(crate) use saddle::bytes as saddle_bytes;
+pub use saddle::{PressureCells, Saddle};
 
 use super::{LinearOperator, Linearization};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt::{Display, Formatter};
-
-/// The sparsity pattern of a tangent: positions of the nodes in the grid, and the reach of an entry.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Neighbours {
-    /// Index of each node; 0 along axes that do not exist.
-    pub nodes: Vec<[u32; 3]>,
-    /// The largest index difference along any axis of two nodes that share an entry, or an upper bound. Entries that arise where nodes
-    /// follow others do not count.
-    pub reach: u32,
-    /// The nodes that each node follows; empty for a node that follows none.
-    pub leaders: Vec<Vec<usize>>,
-    /// The values that are no unknowns, node after node: they are prescribed, or follow others.
-    pub fixed: Vec<bool>,
-}
 
 /// A preconditioner for the tangents of a step. It makes approximate inverses M⁻¹, whose `apply` is z = M⁻¹ r. A positive factor of M
 /// does not matter.
@@ -70,25 +56,19 @@ pub trait Preconditioner {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Preconditioning {
-    /// Block-Jacobi where inertia dominates. Without inertia, or in steps at Courant numbers above 10, the body decides. Multigrid serves
-    /// bodies that are large, may flow plastically or hardly change their volume. The direct solve serves small elastic bodies in 1D and
-    /// 2D, where the program has it. Other bodies take block-Jacobi.
+    /// Multigrid without inertia, and in steps at Courant numbers above 10 for bodies that are large, may flow plastically or hardly change their
+    /// volume. Otherwise block-Jacobi.
     #[default]
     Automatic,
     /// Block-Jacobi: the inverses of the diagonal blocks. It is cheap, and enough where inertia dominates.
     BlockJacobi,
     /// One V-cycle of multigrid. Iterations hardly grow as the grid is refined.
     Multigrid,
-    /// The assembled tangent, factorised once a step, for small systems. Only programs built with the feature `direct` have it.
-    Direct,
     /// No preconditioner.
     None,
 }
 
 impl Preconditioning {
-    /// Whether this program can factorise.
-    pub const HAS_DIRECT: bool = cfg!(feature = "direct");
-
     /// A new preconditioner of this kind for `D` unknowns a node, not yet prepared with a tangent.
     ///
     /// ```
@@ -108,12 +88,8 @@ impl Preconditioning {
     /// ```
     pub fn anew<const D: usize>(self) -> Box<dyn Preconditioner> {
         match self {
-            #[cfg(not(feature = "direct"))]
-            Self::Direct => Self::BlockJacobi.anew::<D>(),
             Self::Automatic | Self::BlockJacobi => Box::new(BlockJacobi::<D>::default()),
             Self::Multigrid => Box::new(Multigrid::<D>::default()),
-            #[cfg(feature = "direct")]
-            Self::Direct => Box::new(Direct::<D>::default()),
             Self::None => Box::new(Identity),
         }
     }
@@ -125,19 +101,9 @@ impl Display for Preconditioning {
             Self::Automatic => "automatic",
             Self::BlockJacobi => "diagonal blocks",
             Self::Multigrid => "multigrid",
-            Self::Direct => "direct solve",
             Self::None => "none",
         })
     }
-}
-
-/// An upper bound on the bytes of the assembled tangent and its factor. The factor counts as a band across a body as long as wide.
-pub(crate) fn direct_bytes(nodes: usize, dimension: usize, reach: usize) -> usize {
-    let across = (nodes as f64).powf(1.0 - 1.0 / dimension as f64).ceil() as usize;
-    let band = dimension * (reach + 1) * across;
-    // The lower half is stored three times, values and row numbers: as lists of columns, in one array, and in the order of the factor.
-    let row = dimension * ((2 * reach + 1).pow(dimension as u32) / 2 + 1);
-    dimension * nodes * (band + 6 * row) * size_of::<f64>()
 }
 
 /// No preconditioning: M = I.

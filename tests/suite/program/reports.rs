@@ -178,7 +178,7 @@ fn a_run_says_what_solves_its_systems_and_warns_of_those_left_unsolved() -> Resu
     let krylov = serde_json::json!({ "method": "conjugate gradients", "why": "the tangent is symmetric" });
     assert_eq!((&report["krylov"], &report["warnings"][0]["kind"]), (&krylov, &"krylov_limited".into()));
     let (_, text, _) = check(&scene("compaction.json"), &[])?;
-    assert!(text.contains("solver        GMRES(30): it was asked for"), "{text}");
+    assert!(text.contains("solver        GMRES(50): it was asked for"), "{text}");
     Ok(())
 }
 

@@ -32,7 +32,7 @@ const CASES: [Case; 3] = [
 
 const LUMPINGS: [(f64, &str); 4] = [(1.0, "1 (lumped)"), (0.5, "0.5"), (0.01, "0.01"), (0.0, "0 (consistent)")];
 
-/// GMRES has no restart within the number of unknowns. With ε = 0 the blocks of the tangent precondition badly, and GMRES(30) stagnates.
+/// GMRES has no restart within the number of unknowns. With ε = 0 the blocks of the tangent precondition badly, and GMRES(50) stagnates.
 const RESTART: &str = r#"solver.krylov.method={"gmres":{"restart":200}}"#;
 
 /// A name, and the tolerance of the linear systems.

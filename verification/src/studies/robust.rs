@@ -41,6 +41,13 @@ const MOST_BY_CONTRAST: f64 = 50.0;
 /// ν, and the iterations allowed in 2D.
 const NEARLY_INCOMPRESSIBLE: [(f64, f64); 3] = [(0.45, 30.0), (0.49, 50.0), (0.499, 100.0)];
 
+/// ν of bodies with mean dilatation, which have the mixed form, and the iterations allowed.
+const AVERAGED: [f64; 3] = [0.49, 0.4999, 0.499999];
+const MOST_AVERAGED: f64 = 60.0;
+
+/// The functions that short effort tries with mean dilatation.
+const WITH_MEANS: [&str; 2] = ["linear", "cubic"];
+
 fn families() -> [(&'static str, Value); 6] {
     [
         ("linear", json!("linear")),
@@ -154,6 +161,9 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
         time_steps(name, &family, &mut others)?;
         cuts(name, &family, *effort, &mut others)?;
         materials(name, &family, &mut others)?;
+        if *effort == Effort::Full || WITH_MEANS.contains(&name) {
+            averaged(name, &family, &mut others)?;
+        }
     }
     Ok(Outcome { reports: vec![refined, others, snap_through(*effort)?], ..Outcome::default() })
 }
@@ -213,6 +223,40 @@ fn cuts(name: &str, family: &Value, effort: Effort, report: &mut Report) -> Resu
         }
         report.push(&["places in a cell, most over least", name, along], most / least, Bound::AtMost(BY_CUTS));
     }
+    Ok(())
+}
+
+/// Bodies with mean dilatation and ν near one half: also in 3D, with cells filled to a thousandth, with two bodies of different stiffness, and in
+/// steps of inertia.
+fn averaged(name: &str, family: &Value, report: &mut Report) -> Result<(), StudyError> {
+    let body = |shape: Value, young: f64, poisson: f64| {
+        json!({
+            "name": format!("{shape}"), "shape": {"box": shape}, "density": 1, "particles_per_cell": 2,
+            "material": {"neo_hookean": {"young": young, "poisson": poisson}}, "volumetric": "mean_dilatation"
+        })
+    };
+    let most = Bound::AtMost(MOST_AVERAGED);
+    let mut judge = |what: &str, at: &str, simulation: Simulation<2>| {
+        push(report, &[what, name, at], simulation, Preconditioning::Multigrid, most);
+    };
+    for poisson in AVERAGED {
+        let bodies = json!({"bodies": [body(json!({"min": [0.53, 0], "max": [1.53, 1]}), 1000.0, poisson)]});
+        judge("ν, mixed form", &poisson.to_string(), scene::<2>(Shape::Block, family, 0.05, &bodies)?);
+    }
+    let whole = |min: f64| body(json!({"min": [min, 0], "max": [1.53, 1]}), 1000.0, 0.4999);
+    let sliver = json!({"bodies": [whole(0.55 - 1.1e-3 * 0.05)]});
+    judge("mixed form", "cells filled to 0.001", scene::<2>(Shape::Block, family, 0.05, &sliver)?);
+    let half = |low: f64, high: f64, young| body(json!({"min": [0.53, low], "max": [1.53, high]}), young, 0.4999);
+    let two = json!({"bodies": [half(0.0, 0.5, 1e6), half(0.5, 1.0, 1e3)]});
+    judge("mixed form", "contrast 1e3", scene::<2>(Shape::Block, family, 0.05, &two)?);
+    for step in [0.5, 0.05, 0.005] {
+        // ρ α₁ h²/G from 1e-4 to 1
+        let moving = json!({"bodies": [whole(0.53)], "time": {"step": step, "end": step}});
+        judge("mixed form, Δt", &step.to_string(), scene::<2>(Shape::Block, family, 0.05, &moving)?);
+    }
+    let block = body(json!({"min": [0.53, 0.53, 0], "max": [1.53, 1.53, 1]}), 1000.0, 0.4999);
+    let simulation = scene::<3>(Shape::Block, family, 0.1, &json!({"bodies": [block]}))?;
+    push(report, &["mixed form", name, "3D"], simulation, Preconditioning::Multigrid, most);
     Ok(())
 }
 

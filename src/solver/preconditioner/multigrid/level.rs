@@ -1,10 +1,10 @@
 //! A coarse grid: hat functions, the tangent on them as stencils, restriction to the grid and interpolation from it.
 
-use super::chebyshev::largest;
 use super::form::LocalForm;
 use crate::aggregation::{Extension, Followers, Occupied, Pieces};
 use crate::solver::LinearOperator;
 use crate::solver::preconditioner::block_jacobi::multiply_blocks;
+use crate::solver::preconditioner::chebyshev::largest;
 use crate::tensor::{Tensor, Vector, identity, inverse};
 use nalgebra::DMatrix;
 use std::borrow::Cow;

@@ -7,17 +7,17 @@
 //! - Chebyshev polynomials over block-Jacobi smooth before and after the coarse correction. Both smoothers are equal, so the cycle is
 //!   symmetric where the tangent is.
 
-mod chebyshev;
 mod filter;
 mod form;
 mod level;
+mod rigid;
 
 pub use form::LocalForm;
 
+use super::chebyshev::{Chebyshev, largest, smooth};
 use super::{BlockJacobi, Preconditioner};
 use crate::solver::vector::xpby;
 use crate::solver::{LinearOperator, Linearization};
-use chebyshev::{largest, smooth};
 use filter::Filter;
 use level::Level;
 use nalgebra::{DVector, Dyn, LU};
@@ -60,7 +60,9 @@ impl<const D: usize> Multigrid<D> {
             let size = D * next.nodes.len();
             let last = size <= BOTTOM || next.grid.iter().all(|&cells| cells <= 1);
             if last && size <= MOST {
-                self.bottom = Some(level.assembled().lu());
+                let mut matrix = level.assembled();
+                rigid::hold::<D>(&mut matrix, &next.nodes, &next.fixed());
+                self.bottom = Some(matrix.lu());
             }
             self.levels.push(level);
             form = next;
@@ -90,9 +92,9 @@ impl<const D: usize> Multigrid<D> {
             return x;
         }
         let jacobi = |r: &[f64], z: &mut [f64]| level.precondition(r, z);
-        smooth(level, &jacobi, level.largest, b, &mut x, true);
+        smooth(Chebyshev::SMOOTHER, level, &jacobi, level.largest, b, &mut x, true);
         self.correct(from + 1, level, b, &mut x);
-        smooth(level, &jacobi, level.largest, b, &mut x, false);
+        smooth(Chebyshev::SMOOTHER, level, &jacobi, level.largest, b, &mut x, false);
         x
     }
 
@@ -117,11 +119,11 @@ impl<const D: usize> LinearOperator for Cycle<'_, D> {
         let Self { levels, tangent } = *self;
         let jacobi = |r: &[f64], z: &mut [f64]| levels.filtered(r, z);
         z.fill(0.0);
-        smooth(tangent, &jacobi, levels.largest, r, z, true);
-        mutant!("multigrid: no coarse levels": { return smooth(tangent, &jacobi, levels.largest, r, z, false); });
+        smooth(Chebyshev::SMOOTHER, tangent, &jacobi, levels.largest, r, z, true);
+        mutant!("multigrid: no coarse levels": { return smooth(Chebyshev::SMOOTHER, tangent, &jacobi, levels.largest, r, z, false); });
         levels.correct(0, tangent, r, z);
         mutant!("multigrid: no smoothing after the coarse levels": { return; });
-        smooth(tangent, &jacobi, levels.largest, r, z, false);
+        smooth(Chebyshev::SMOOTHER, tangent, &jacobi, levels.largest, r, z, false);
     }
 }
 

@@ -37,6 +37,8 @@ const LAWS: Check = Check::Test("laws::");
 const SCHEMES: Check = Check::Test("schemes::");
 const SMOOTH: Check = Check::Test("smoothing::");
 const LEVELS: Check = Check::Test("multigrid::");
+const INCOMPRESSIBLE: Check = Check::Test("incompressible::");
+const STATICS: Check = Check::Test("statics::");
 const FOLLOWS: Check = Check::Test("aggregation::");
 const PATHS: Check = Check::Test("path::");
 const KEPT: Check = Check::Test("kept::");
@@ -88,6 +90,8 @@ pub(super) const FAULTS: &[ShippedFault] = &[
     fault("mean dilatation: the product lacks the coupling within a cell", TANGENT, POINTS),
     fault("mean dilatation: that of earlier grids is forgotten", CELLS, POINTS),
     fault("mean dilatation: means of a kept grid stay where particles were", CELLS, KEPT),
+    fault("mixed: the product lacks the compressibility", INCOMPRESSIBLE, POINTS),
+    fault("mixed: the residual of a cell is that of half its volume", INCOMPRESSIBLE, POINTS),
     fault("loads: a traction has the other sign", LOADS, TANGENT),
     fault("loads: the tangent of a pressure has a wrong sign", TANGENT, DYNAMICS),
     fault("unknowns: prescribed values are not cleared", DYNAMICS, POINTS),
@@ -151,6 +155,9 @@ pub(super) const FAULTS: &[ShippedFault] = &[
     fault("multigrid: cubic splines have no filter", LEVELS, POINTS),
     fault("multigrid: no smoothing after the coarse levels", LEVELS, FOLLOWS),
     fault("multigrid: held values lead others in the matrix of the bottom level", LEVELS, POINTS),
+    fault("multigrid: motions that nothing holds have no stiffness", STATICS, LEVELS),
+    fault("saddle: cells are alone in the Schur complement", INCOMPRESSIBLE, LEVELS),
+    fault("saddle: the motions do not see the residual of the volumes", INCOMPRESSIBLE, LEVELS),
     fault("solids: a curved surface by one plane a box", SOLIDS, PATCH),
     fault("solids: slivers are left alone", SOLIDS, PATCH),
     fault("solids: the gap between planes and a curved surface is left out", SOLIDS, PATCH),

@@ -1,13 +1,21 @@
-//! Smoothing by Chebyshev polynomials over block-Jacobi, and the largest eigenvalue that they need.
+//! Chebyshev polynomials over block-Jacobi, and the largest eigenvalue that they need.
 
 use crate::solver::LinearOperator;
 use crate::solver::vector::{axpy, dot, xpby};
 use nalgebra::DMatrix;
 
-/// Degree of the smoothing polynomials.
-const DEGREE: usize = 5;
-/// The polynomials damp the part [λ/PART, λ] of the spectrum.
-const PART: f64 = 30.0;
+/// A Chebyshev polynomial.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Chebyshev {
+    pub degree: usize,
+    /// The polynomial damps the part [λ/part, λ] of the spectrum.
+    pub part: f64,
+}
+
+impl Chebyshev {
+    /// The smoother of multigrid.
+    pub const SMOOTHER: Self = Self { degree: 5, part: 30.0 };
+}
 
 /// Number of products that estimate the largest eigenvalue λ of D⁻¹K.
 const ESTIMATE: usize = 10;
@@ -57,6 +65,7 @@ pub(super) fn largest(operator: &dyn LinearOperator, jacobi: &dyn Fn(&[f64], &mu
 
 /// Smooths: x ← x + p(D⁻¹K) D⁻¹ (b − K x) with a Chebyshev polynomial p. `zero` tells that x = 0 at the start, which saves a product.
 pub(super) fn smooth(
+    Chebyshev { degree, part }: Chebyshev,
     operator: &dyn LinearOperator,
     jacobi: &dyn Fn(&[f64], &mut [f64]),
     largest: f64,
@@ -65,7 +74,7 @@ pub(super) fn smooth(
     zero: bool,
 ) {
     let n = b.len();
-    let (upper, lower) = (largest, largest / PART);
+    let (upper, lower) = (largest, largest / part);
     let (theta, delta) = (0.5 * (upper + lower), 0.5 * (upper - lower));
     let sigma = theta / delta;
     let (mut r, mut z, mut p) = (b.to_vec(), vec![0.0; n], vec![0.0; n]);
@@ -76,9 +85,9 @@ pub(super) fn smooth(
     jacobi(&r, &mut z);
     p.iter_mut().zip(&z).for_each(|(p, z)| *p = z / theta);
     let mut rho = 1.0 / sigma;
-    for step in 0..DEGREE {
+    for step in 0..degree {
         x.iter_mut().zip(&p).for_each(|(x, p)| *x += p);
-        if step + 1 == DEGREE {
+        if step + 1 == degree {
             break;
         }
         operator.apply(&p, &mut z);

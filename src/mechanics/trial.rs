@@ -1,0 +1,28 @@
+//! A trial state of the unknowns of a step.
+
+use crate::tensor::Vector;
+
+/// A trial state of the unknowns.
+#[derive(Debug)]
+pub(crate) struct Trial<'x, T, const D: usize> {
+    /// Δφ at every active node.
+    pub dphi: &'x [Vector<T, D>],
+    /// The dilatation of every averaged cell in its [unit](crate::mechanics::dilatation::Scale), where it is an unknown of its own;
+    /// otherwise empty.
+    pub dilatation: &'x [T],
+}
+
+impl<T, const D: usize> Clone for Trial<'_, T, D> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<T, const D: usize> Copy for Trial<'_, T, D> {}
+
+impl<'x, T, const D: usize> Trial<'x, T, D> {
+    /// A motion that determines the dilatation of the cells.
+    pub fn motion(dphi: &'x [Vector<T, D>]) -> Self {
+        Self { dphi, dilatation: &[] }
+    }
+}

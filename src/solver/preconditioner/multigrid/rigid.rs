@@ -1,0 +1,58 @@
+//! Rigid motions of the last level. A body that nothing holds has a singular matrix, and round-off would move the body by any distance.
+
+use nalgebra::{DMatrix, DVector};
+
+/// A motion with less energy than this, relative to that of its nodes one by one, is a rigid motion that nothing holds.
+const NOTHING: f64 = 1e-12;
+
+/// A motion that differs from earlier ones by less than this part of it is none of its own.
+const DEPENDENT: f64 = 1e-6;
+
+/// Gives rigid motions that nothing holds a stiffness, and changes no other motion. `fixed` are the values that are no unknowns.
+pub(super) fn hold<const D: usize>(matrix: &mut DMatrix<f64>, nodes: &[[u32; 3]], fixed: &[bool]) {
+    mutant!("multigrid: motions that nothing holds have no stiffness": { return; });
+    let weight = matrix.diagonal();
+    let within = |a: &DVector<f64>, b: &DVector<f64>| a.component_mul(&weight).dot(b);
+    let middle: [f64; D] =
+        std::array::from_fn(|k| nodes.iter().map(|at| f64::from(at[k])).sum::<f64>() / nodes.len() as f64);
+    let arm = |node: usize, k: usize| f64::from(nodes[node][k]) - middle[k];
+    let field = |of: &dyn Fn(usize, usize) -> f64| {
+        DVector::from_fn(matrix.nrows(), |i, _| if fixed[i] { 0.0 } else { of(i / D, i % D) })
+    };
+    let translations = (0..D).map(|axis| field(&|_, i| if i == axis { 1.0 } else { 0.0 }));
+    let planes = (0..D).flat_map(|a| (a + 1..D).map(move |b| (a, b)));
+    let turn = |(a, b): (usize, usize)| {
+        field(&|node, i| {
+            if i == a {
+                -arm(node, b)
+            } else if i == b {
+                arm(node, a)
+            } else {
+                0.0
+            }
+        })
+    };
+    let mut motions: Vec<DVector<f64>> = Vec::new();
+    for mut motion in translations.chain(planes.map(turn)) {
+        let before = within(&motion, &motion).sqrt();
+        for other in &motions {
+            motion -= other * within(other, &motion);
+        }
+        let left = within(&motion, &motion).sqrt();
+        if left > DEPENDENT * before {
+            motions.push(motion / left);
+        }
+    }
+    let energy = DMatrix::from_fn(motions.len(), motions.len(), |i, j| motions[i].dot(&(&*matrix * &motions[j])));
+    if energy.iter().any(|x| !x.is_finite()) {
+        return;
+    }
+    let modes = (0.5 * (&energy + energy.transpose())).symmetric_eigen();
+    for (energy, shares) in modes.eigenvalues.iter().zip(modes.eigenvectors.column_iter()) {
+        if energy.abs() < NOTHING {
+            let motion: DVector<f64> = motions.iter().zip(&shares).map(|(motion, share)| motion * *share).sum();
+            let force = motion.component_mul(&weight);
+            *matrix += &force * force.transpose();
+        }
+    }
+}

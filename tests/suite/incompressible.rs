@@ -1,0 +1,134 @@
+//! Nearly incompressible bodies: the mixed form gives the answer of the form of motions alone, in iterations that depend neither on ν nor on h.
+
+use crate::support::{Failure, advance, run_to, scene};
+use bfree::plan::Plan;
+use bfree::simulation::{Simulation, StepReport};
+use bfree::solver::{Preconditioning, Saddle};
+use std::num::NonZeroU64;
+
+const CUBIC: &str = r#"{"bspline":{"degree":3}}"#;
+
+/// Cook's membrane of G = 422.5 kPa under its whole load.
+fn membrane(poisson: f64, spacing: f64, approximation: &str, more: &[&str]) -> Result<Simulation<2>, Failure> {
+    let given = [
+        format!("grid={{\"size\":[60,84],\"spacing\":{spacing}}}"),
+        format!("bodies.0.material.neo_hookean={{\"young\":{},\"poisson\":{poisson}}}", 0.845 * (1.0 + poisson)),
+        format!("approximation={approximation}"),
+        r#"bodies.0.volumetric="mean_dilatation""#.to_owned(),
+        "time.step=1".to_owned(),
+        "output={}".to_owned(),
+    ];
+    let given: Vec<&str> = given.iter().map(String::as_str).chain(more.iter().copied()).collect();
+    scene("cook.json", &given)
+}
+
+fn counts<const D: usize>(step: &StepReport<D>) -> (usize, usize) {
+    (step.newton.history.iterations.len(), step.newton.history.counts.krylov_iterations)
+}
+
+/// The largest distance of two sets of positions, relative to the largest displacement.
+fn apart<const D: usize>(a: &Simulation<D>, b: &Simulation<D>, start: &Simulation<D>) -> f64 {
+    let [a, b, start] = [a, b, start].map(|of| of.particles.by_id().position);
+    let most = |pairs: &mut dyn Iterator<Item = f64>| pairs.fold(0.0, f64::max);
+    let moved = most(&mut a.iter().zip(&start).map(|(a, start)| (a - start).norm()));
+    most(&mut a.iter().zip(&b).map(|(a, b)| (a - b).norm())) / moved
+}
+
+/// Up to κ/G of half a million, the whole load in one step.
+#[test]
+fn iterations_depend_neither_on_the_bulk_modulus_nor_on_the_grid() -> Result<(), Failure> {
+    for (approximation, least) in [("\"linear\"", 100), (CUBIC, 140)] {
+        let mut all = Vec::new();
+        for spacing in [4.0, 2.0] {
+            for poisson in [0.49, 0.4999, 0.499999] {
+                let step = membrane(poisson, spacing, approximation, &[])?.advance()?;
+                assert!(step.failed.is_empty(), "{approximation} {poisson}");
+                all.push(counts(&step));
+            }
+        }
+        let (newton, krylov): (Vec<_>, Vec<_>) = all.into_iter().unzip();
+        assert!(newton.iter().all(|&n| n <= 8), "{approximation}: {newton:?}");
+        // Flat in κ from 5000 G on.
+        assert!(krylov.chunks(3).all(|of| of[2].abs_diff(of[1]) * 20 <= of[1]), "{approximation}: {krylov:?}");
+        assert!(krylov.iter().all(|&k| k <= least), "{approximation}: {krylov:?}");
+    }
+    Ok(())
+}
+
+/// In load steps, and in steps of inertia at a large Courant number.
+#[test]
+fn the_mixed_form_gives_the_answer_of_motions_alone() -> Result<(), Failure> {
+    let tight = "solver.newton.tolerance=1e-11";
+    let dynamic = [
+        r#"time={"step":0.02,"end":0.04,"scheme":{"generalized_alpha":{"spectral_radius":0.8}}}"#,
+        "bodies.0.density=1e-6",
+        "grid.reset=\"every_step\"",
+    ];
+    for (poisson, more) in [(0.49, &["time.step=0.5"][..]), (0.4999, &["time.step=0.125"]), (0.49, &dynamic)] {
+        let more = [&[tight], more].concat();
+        let start = membrane(poisson, 6.0, "\"linear\"", &more)?;
+        let [mut mixed, mut motions] = [start.clone(), start.clone()];
+        motions.settings.preconditioner = Preconditioning::BlockJacobi;
+        for simulation in [&mut mixed, &mut motions] {
+            advance(simulation, 2)?;
+        }
+        assert!(Plan::of(&start)?.krylov.1.contains("averaged cells"), "{}", Plan::of(&start)?);
+        assert!(Plan::of(&motions)?.unknowns < Plan::of(&mixed)?.unknowns);
+        let apart = apart(&mixed, &motions, &start);
+        assert!(apart < 1e-7, "ν = {poisson}: {apart:e}");
+    }
+    Ok(())
+}
+
+/// Every law with a volumetric part, by dual numbers through the product that GMRES applies, at the end of the first steps.
+#[test]
+fn the_product_of_the_mixed_form_is_the_derivative_of_its_residuals() -> Result<(), Failure> {
+    let every = NonZeroU64::new(1);
+    for law in [
+        r#"{"neo_hookean":{"bulk":500,"shear":1}}"#,
+        r#"{"neo_hookean_logarithmic":{"bulk":500,"shear":1}}"#,
+        r#"{"mooney_rivlin":{"c1":0.3,"c2":0.2,"bulk":500}}"#,
+        r#"{"ogden":{"terms":[{"modulus":1.2,"exponent":1.5},{"modulus":-0.1,"exponent":-2}],"bulk":500}}"#,
+        r#"{"von_mises":{"elastic":{"bulk":500,"shear":1},"yield_stress":{"initial":0.15,"linear":0.5}}}"#,
+    ] {
+        let given = [&format!("bodies.0.material={law}"), "tractions.0.traction=[0,0.02]", "time.step=0.25"];
+        let mut plane = membrane(0.49, 6.0, CUBIC, &given).map_err(|error| format!("{law}: {error}"))?;
+        plane.settings.check_tangent = every;
+        advance(&mut plane, 2)?;
+        let given = [
+            &format!("bodies.0.material={law}"),
+            "gravity.acceleration=[0.05,0,-0.1]",
+            "grid.spacing=0.25",
+            r#"bodies.0.volumetric="mean_dilatation""#,
+        ];
+        let mut block = scene::<3>("block_static.json", &given)?;
+        block.settings.check_tangent = every;
+        assert!(Plan::of(&block)?.terms.iter().any(|term| term.name == "dilatation of cells" && term.used));
+        run_to(&mut block, 1.0)?;
+    }
+    Ok(())
+}
+
+/// A preconditioner of motions alone serves systems without pressures as before.
+#[test]
+fn a_saddle_over_motions_is_the_preconditioner_of_motions() -> Result<(), Failure> {
+    let pointwise = r#"bodies.0.volumetric="pointwise""#;
+    let simulation = membrane(0.3, 6.0, "\"linear\"", &[pointwise])?;
+    let supports = bfree::mechanics::sweep::Supports::new(
+        &simulation.approximation,
+        &simulation.grid,
+        &simulation.particles.position,
+    )?
+    .0;
+    let nodal = bfree::mechanics::transfer::Nodal::default();
+    let equilibrium = simulation.equilibrium(&supports, &nodal, &[], bfree::mechanics::schemes::Alphas::START, 0.0);
+    let tangent = equilibrium.tangent(&vec![bfree::tensor::Vector::zeros(); supports.nodes()])?;
+    let r: Vec<f64> = (0..2 * supports.nodes()).map(|k| (k as f64).sin()).collect();
+    let [mut one, mut other] = [vec![0.0; r.len()], vec![0.0; r.len()]];
+    Preconditioning::BlockJacobi.anew::<2>().prepare(&tangent).apply(&r, &mut one);
+    Saddle::<2>::over(Preconditioning::BlockJacobi.anew::<2>());
+    let mut saddle = Saddle::<2>::over(Preconditioning::BlockJacobi.anew::<2>());
+    bfree::solver::Preconditioner::prepare(&mut saddle, &tangent).apply(&r, &mut other);
+    assert_eq!(one, other);
+    Ok(())
+}
