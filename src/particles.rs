@@ -14,7 +14,8 @@ pub enum Dilatation {
     #[default]
     Pointwise,
     /// The mean over the particles in a cell of the grid. It keeps a nearly incompressible body from locking. For laws whose energy has a
-    /// part that depends on the volume alone; not for `st_venant_kirchhoff` and `drucker_prager`.
+    /// part that depends on the volume alone; not for `st_venant_kirchhoff`, `drucker_prager`, and laws
+    /// from libraries.
     MeanDilatation,
 }
 

@@ -84,6 +84,8 @@ pub type TangentBlocks<const D: usize> = [[Tensor<f64, D>; D]; D];
 /// assert_eq!(next, [1.5]);
 /// assert!(law.stress(&stretched.in_step(1.0, &next))[(0, 0)] < law.stress(&before)[(0, 0)]);
 /// ```
+///
+/// A state may come without internal variables (`at.internal` is empty): they then have their values at rest.
 pub trait Law: Send + Sync {
     /// Strain energy density `W`, or the incremental potential of the step.
     fn energy<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> T;
@@ -140,7 +142,7 @@ pub trait Law: Send + Sync {
         Tensor::from_columns(&std::array::from_fn::<_, D, _>(column))
     }
 
-    /// The material tangent of a law without a closed form, for gradients taken in the configuration n: F ℂmat{F_rᵀe_k, F_rᵀe_l} Fᵀ in row
+    /// The material tangent of a law without a closed form, for gradients taken in the configuration of the last grid reset: F ℂmat{F_rᵀe_k, F_rᵀe_l} Fᵀ in row
     /// k and column l. A law that solves equations at each state overrides the default, to solve them once for all pairs.
     fn tangent_blocks<const D: usize>(&self, f_r: &Tensor<f64, D>, at: &MaterialState<f64, D>) -> TangentBlocks<D> {
         let unit = |k: usize| f_r.row(k).transpose();
@@ -150,7 +152,7 @@ pub trait Law: Send + Sync {
     }
 
     /// The closed form of the whole tangent (geometric + material) of a particle, if the law has one. `volume` is the reference volume.
-    /// Gradients are taken in the configuration n with the deformation gradient `f_r`. A law returns `Some` at every state, or `None` at
+    /// Gradients are taken in the configuration of the last grid reset, whose deformation gradient is `f_r`. A law returns `Some` at every state, or `None` at
     /// every state.
     ///
     /// ```

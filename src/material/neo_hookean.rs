@@ -113,7 +113,7 @@ impl<U: Volumetric> Law for NeoHookean<U> {
     }
 
     /// V₀ [ G L b_r + ΛJ² (A:L) A − q A Lᵀ A ],  A = ΔF⁻ᵀ = F⁻ᵀ F_rᵀ: δP = G δF + ΛJ² (F⁻ᵀ:δF) F⁻ᵀ − q F⁻ᵀ δFᵀ F⁻ᵀ pushed
-    /// forward to the configuration n.
+    /// forward to the configuration of the last grid reset.
     #[inline(always)]
     fn closed<const D: usize>(
         &self,

@@ -63,7 +63,7 @@ impl Law for StVenantKirchhoff {
     }
 
     /// V₀ [ L F_r S F_rᵀ + Λ (M:L) M + G M Lᵀ M + G b L b_r ],  M = F F_rᵀ: δF S + F [ℂ : Fᵀ δF] with δF = L F_r, pushed
-    /// forward to the configuration n.
+    /// forward to the configuration of the last grid reset.
     #[inline(always)]
     fn closed<const D: usize>(
         &self,

@@ -1,8 +1,8 @@
 //! The mean dilatation of the particles of a cell: Θ = Σ V_p ΔJ_p / Σ V_p. V_p is the volume at the last grid reset, ΔJ_p the volume ratio
 //! since then. A particle belongs to the cell that it was in at that reset. Each body in a cell has a mean of its own.
 //!
-//! A particle stores θ_n, the product of the Θ of all earlier grids. Its stress depends on θ = Θ θ_n, so that stresses are continuous at a
-//! grid reset. Between two resets θ_n and H keep their values of the last reset.
+//! A particle stores θ. Its stress depends on θ = Θ θ_r, where θ_r is the value at the last grid reset, the product of the Θ of all earlier grids.
+//! So stresses are continuous at a grid reset. The reference configuration keeps θ_r.
 
 use crate::lanes::LANES;
 use crate::material::{Law, p_wave_modulus};
@@ -22,24 +22,25 @@ pub(crate) struct Member {
     pub slot: u32,
 }
 
-/// The units of a cell whose dilatation is an unknown of its own. The unknown is a length and its residual a force, like those of nodes.
+/// The units of a cell whose dilatation is an unknown of its own. κ is θ (θ U′)′ at θ = 1: Λ in Ciarlet's law, K in logarithmic strains. The unknown is a length and its residual a force, like those of nodes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Scale {
     /// G/h, the residual per difference of volumes.
     pub force: f64,
     /// G/(κ h), the change of Θ per unit of the unknown. The pressure changes by G/h.
     pub dilatation: f64,
-    /// G, half of what the modulus of uniaxial strain is without U.
+    /// The effective G = ½ (M − κ), with the modulus M of uniaxial strain.
     pub shear: f64,
 }
 
 impl Scale {
-    /// The smallest G, relative to κ.
+    /// The smallest κ and G, relative to the modulus of uniaxial strain.
     const SMALLEST: f64 = 1e-9;
 
     fn of<L: Law>(body: &Body<L>, spacing: f64) -> Self {
-        let bulk = body.response::<f64>(0.0).map_or(1.0, |of| of.stiffness);
-        let shear = (0.5 * (p_wave_modulus(&body.law) - bulk)).max(Self::SMALLEST * bulk);
+        let modulus = p_wave_modulus(&body.law);
+        let bulk = body.response::<f64>(0.0).map_or(modulus, |of| of.stiffness).max(Self::SMALLEST * modulus);
+        let shear = (0.5 * (modulus - bulk)).max(Self::SMALLEST * modulus);
         Self { force: shear / spacing, dilatation: shear / (bulk * spacing), shear }
     }
 }

@@ -1,5 +1,7 @@
 //! The mixed form for nearly incompressible bodies: the dilatation Θ of each averaged cell is an unknown of its own, beside the motion.
 //!
+//! [`Simulation::is_mixed`](crate::simulation::Simulation) says when a step has this form: long steps of a nearly incompressible body.
+//!
 //! Where the volumetric stiffness κ is much larger than G, Newton's method in the motion alone takes many short steps, and the iterations of
 //! its linear solver grow with κ/G. The mixed form has neither defect. Its residuals are
 //!
@@ -26,7 +28,7 @@ use crate::tensor::{Tensor, Vector, inverse};
 
 /// The tangent in the motion of the nodes and the dilatation of the cells.
 pub(crate) struct MixedTangent<'a, const D: usize> {
-    /// A + Bᵀ γ B
+    /// Its product is (A + Bᵀ γ B) u, and with given pressures A u + Bᵀ p.
     pub tangent: Tangent<'a, D>,
 }
 
@@ -62,7 +64,7 @@ impl<const D: usize> LinearOperator for MixedTangent<'_, D> {
 }
 
 impl<const D: usize> MixedTangent<'_, D> {
-    /// B_c D⁻¹ B_cᵀ of every cell, with the diagonal blocks D.
+    /// B_c K_II⁻¹ B_cᵀ of every cell, with the diagonal blocks K_II.
     fn softness(&self) -> Vec<f64> {
         let Tangent { unknowns, supports, .. } = &self.tangent;
         let held = unknowns.prescribed_mask(supports.nodes());
@@ -83,7 +85,7 @@ impl<const D: usize> MixedTangent<'_, D> {
     }
 }
 
-/// The diagonal blocks and the local form are those of A + Bᵀ γ B.
+/// The diagonal blocks are those of A + Bᵀ γ B.
 impl<const D: usize> Linearization for MixedTangent<'_, D> {
     fn diagonal_blocks(&self) -> Pooled<f64> {
         Linearization::diagonal_blocks(&self.tangent)
@@ -117,9 +119,10 @@ impl<const D: usize> SaddlePoint for MixedTangent<'_, D> {
         let mut all = PressureCells {
             occupied: self.tangent.occupied_cells().0,
             softness: self.softness(),
+            inertia: self.tangent.has_inertia,
             ..PressureCells::default()
         };
-        for (cell, pressure) in self.cells().iter().zip(self.pressures()) {
+        for cell in self.cells() {
             all.index.push(std::array::from_fn(|k| if k < D { cell.index[k] } else { 0 }));
             all.centroid.push(std::array::from_fn(|k| {
                 if k < D { (cell.centroid[k] - grid.origin[k]) / grid.spacing } else { 0.0 }
@@ -130,7 +133,7 @@ impl<const D: usize> SaddlePoint for MixedTangent<'_, D> {
             all.shear.push(cell.scale.shear);
             all.stiffness.push(cell.stiffness);
             all.augmented.push(cell.augmented);
-            all.pressure.push(pressure);
+            all.unit.push(cell.reference_volume * cell.scale.dilatation);
             all.weight.push(cell.scale.force);
         }
         all

@@ -1,11 +1,11 @@
 //! The weak form: transfer, loads, residual, and the matrix-free tangent.
 
 mod affine;
-mod cells;
 pub mod check;
 pub mod constitutive;
 pub(crate) mod dilatation;
 pub mod loads;
+mod local_form;
 pub mod mass;
 pub(crate) mod mixed;
 pub mod path;

@@ -51,6 +51,7 @@ pub struct Tangent<'a, const D: usize> {
     pub(super) unknowns: Unknowns<'a, D>,
     pub(super) particles: &'a Particles<D>,
     pub(super) terms: Vec<Box<dyn Linearized<D> + 'a>>,
+    pub(super) has_inertia: bool,
 }
 
 impl<const D: usize> Tangent<'_, D> {
@@ -141,7 +142,7 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
         self.tangent_at(piece.into(), Trial::motion(dphi))
     }
 
-    /// The linearisation at a trial state. In the mixed form it is K + Bᵀ γ B.
+    /// The linearisation at a trial state. In the mixed form it is A + Bᵀ γ B ([`mixed`](crate::mechanics::mixed)).
     pub(super) fn tangent_at(
         &self,
         piece: Option<Piece>,
@@ -149,7 +150,8 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     ) -> Result<Tangent<'_, D>, Inadmissible> {
         let terms = self.terms.linearize(piece, Trial { dphi: &self.unknowns.extended(at.dphi), ..at })?;
         let (supports, particles) = (self.step.supports, self.step.particles);
-        Ok(Tangent { supports, unknowns: self.unknowns.clone(), particles, terms })
+        let has_inertia = !self.step.nodal.is_static();
+        Ok(Tangent { supports, unknowns: self.unknowns.clone(), particles, terms, has_inertia })
     }
 
     /// A piece of K u by dual numbers: the derivative of the same piece of the residual, through the same transfer loop.

@@ -5,7 +5,7 @@ use crate::tensor::Vector;
 /// A trial state of the unknowns.
 #[derive(Debug)]
 pub(crate) struct Trial<'x, T, const D: usize> {
-    /// Δφ at every active node.
+    /// φ, the nodal motion since the last grid reset, which is Δφ with a reset in every step.
     pub dphi: &'x [Vector<T, D>],
     /// The dilatation of every averaged cell in its [unit](crate::mechanics::dilatation::Scale), where it is an unknown of its own;
     /// otherwise empty.

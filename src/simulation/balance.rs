@@ -53,6 +53,8 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             let equilibrium = self.equilibrium(supports, nodal, prescribed, scheme.balance(dt), load);
             Equilibrium { stop: self.settings.stop.as_ref(), mixed: self.is_mixed(), ..equilibrium }
         };
+        // A law may have refused a trial that the line search mended. Only refusals of this step explain its failure.
+        self.bodies.iter().for_each(|body| _ = body.law.last_failure());
         let mut load = self.load_of_balance();
         let mut equilibrium = under(load);
         let mut phi = self.initial_guess(supports, nodal, theta * dt);

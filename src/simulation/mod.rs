@@ -208,7 +208,7 @@ impl<const D: usize, L: Law, A> Simulation<D, L, A> {
     pub fn krylov(&self) -> (Krylov, &'static str) {
         let mut unsymmetric = unsymmetric(&self.bodies, &self.loads);
         if self.is_mixed() {
-            unsymmetric = Some("the pressures of averaged cells are unknowns, too");
+            unsymmetric = Some("the dilatations of averaged cells are unknowns, too");
         }
         if self.settings.scheme.follows_path() {
             unsymmetric = Some("on a path of equilibria, the load is unknown too");

@@ -10,7 +10,7 @@ use crate::solver::{Krylov, Preconditioning};
 /// The ratio is about that of ν = 0.4998: at 0.4999, no step is found with block-Jacobi.
 const ISOCHORIC: f64 = 0.999;
 
-/// Above this ratio, the dilatations of averaged cells are unknowns of their own. The ratio is about that of ν = 0.45.
+/// Above this ratio, the dilatations of averaged cells are unknowns of their own. The ratio is that of ν = 0.444.
 const NEARLY_INCOMPRESSIBLE: f64 = 0.8;
 
 /// Numbers of particles in 1D, 2D and 3D from which on multigrid was faster than block-Jacobi in long steps with inertia.

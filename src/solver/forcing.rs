@@ -25,7 +25,7 @@ pub enum Forcing {
     Fixed(#[schemars(range(min = 1e-15, max = 0.9))] f64),
     /// An η that follows the progress of Newton's method (Eisenstat and Walker, SIAM J. Sci. Comput. 17, 1996, choice 2 with γ = 0.9,
     /// α = 2): 0.01 at first, then 0.9 times the square of the last factor by which the residual fell, and at most 0.01. So convergence stays
-    /// quadratic. The last η is not much tighter than the end of the iteration needs.
+    /// quadratic. The last η is at most a hundred times tighter than the end of the iteration needs.
     EisenstatWalker,
 }
 
@@ -39,7 +39,7 @@ impl Forcing {
     pub(super) fn check(self) -> Result<(), InvalidSetting> {
         match self {
             Self::Fixed(η) => {
-                InvalidSetting::check(η > 0.0 && η < LOOSEST, "forcing", η, "more than 0 and less than 0.9")
+                InvalidSetting::check(η > 0.0 && η <= LOOSEST, "forcing", η, "more than 0 and at most 0.9")
             }
             Self::EisenstatWalker => Ok(()),
         }
@@ -59,7 +59,7 @@ impl Forcing {
                 });
                 // The last solve is not much tighter than needed (Kelley 1995, eq. 6.20). Kelley takes half of the remaining reduction, which
                 // hides the order of convergence.
-                choice.max(LAST * wanted).min(LOOSEST)
+                choice.max(LAST * wanted)
             }
         }
     }
@@ -83,7 +83,7 @@ mod tests {
 
     #[test]
     fn range_of_the_fixed_term() {
-        for bad in [0.0, -1.0, 0.9, 2.0, f64::NAN] {
+        for bad in [0.0, -1.0, 0.901, 2.0, f64::NAN] {
             assert!(Forcing::Fixed(bad).check().is_err(), "{bad}");
         }
         assert!(Forcing::Fixed(1e-8).check().is_ok());

@@ -1,4 +1,4 @@
-//! Krylov and Newton methods on plain vectors: operators and vectors, no mechanics.
+//! Krylov and Newton methods on plain vectors. Preconditioners also know forms on the cells of a grid; laws and particles they do not know.
 //!
 //! A nodal field of `D` components per node is one flat `&[f64]`, node after node. No constant in this folder has a unit. A problem whose
 //! unknowns and residual are multiplied by powers of two takes the same iterations with the same bits.

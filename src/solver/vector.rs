@@ -88,7 +88,8 @@ pub fn scaled(a: f64, x: &[f64], y: &mut [f64]) {
     update(x, y, |x, _| a * x);
 }
 
-fn update(x: &[f64], y: &mut [f64], f: impl Fn(f64, f64) -> f64 + Sync) {
+/// `yᵢ ← f(xᵢ, yᵢ)`
+pub(super) fn update(x: &[f64], y: &mut [f64], f: impl Fn(f64, f64) -> f64 + Sync) {
     let chunk = |(x, y): (&[f64], &mut [f64])| {
         for (x, y) in x.iter().zip(y) {
             *y = f(*x, *y);

@@ -65,7 +65,7 @@ impl<'a, T: Real> States<'a, T> {
         states
     }
 
-    /// ∇u, the state at t_n, and V₀ of one particle.
+    /// ∇u, F of the last grid reset with the internal variables at t_n, and V₀ of one particle.
     #[inline(always)]
     fn of_lane<const D: usize>(&self, lane: usize) -> (Tensor<T, D>, MaterialState<'_, f64, D>, f64) {
         let gradient = Tensor::from_fn(|i, k| self.gradient[i * D + k][lane]);

@@ -36,7 +36,7 @@ fn carried<T: Real>(x: T, carries: bool) -> T {
     if carries { x } else { T::lit(x.value()) }
 }
 
-/// H_{n+1} of F = ΔF F_r with ΔF = I + G: H = G + H_r + G H_r, which loses no digits (eq. 45).
+/// H of F = ΔF F_r with ΔF = I + G: H = G + H_r + G H_r, which loses no digits (eq. 45).
 ///
 /// ```
 /// use bfree::mechanics::residual::compose;
@@ -54,7 +54,7 @@ pub fn compose<T: Real, const D: usize>(g: &Tensor<T, D>, h_r: &Tensor<f64, D>) 
     g + h_r + g * h_r
 }
 
-/// V₀ F S F_rᵀ at ∇u = `g`, from the state `at_r` at t_n; its product with ∇_r N_I is the internal force on node I. Also returns det F, which the caller must check.
+/// V₀ F S F_rᵀ at ∇u = `g`, from the state `at_r`, F of the last grid reset and internal variables at t_n; its product with ∇_r N_I is the internal force on node I. Also returns det F, which the caller must check.
 /// Where det F ≤ 0, S is that of the undeformed body. Only the F of `part` carry derivatives.
 #[inline(always)]
 pub(super) fn internal<L: Law, T: Real, const D: usize>(

@@ -38,7 +38,7 @@ pub enum GridReset {
     /// After every step, as in the paper.
     #[default]
     EveryStep,
-    /// Never.
+    /// Never because of strain. Contact still resets the grid.
     Never,
     /// After a step at whose end ‖½ (F_rᵀ F_r − I)‖ of a particle is larger than this value (no unit). F_r is the deformation of the
     /// particle since the last reset.

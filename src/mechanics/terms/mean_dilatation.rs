@@ -14,8 +14,8 @@
 //!
 //! The first part of δσ couples the particles of a cell; the second has the form of a [`ClosedTangent`](crate::material::ClosedTangent).
 //!
-//! In the mixed form, Θ_c is an unknown of its own, with the residual v − Θ_c V_c ([`mixed`](crate::mechanics::mixed)). Newton's method then
-//! meets no stiffness κ of the motion.
+//! In the mixed form, Θ_c is an unknown of its own, with the residual v − Θ_c V_c ([`mixed`](crate::mechanics::mixed)). In π and k, Θ_c V_c then
+//! stands for v.
 
 use super::term::{
     Along, AtPoints, BlocksAtPoints, FunctionsAt, Linearized, LinearizedTerm, MixedCell, MixedCells, ProductAtPoints,
@@ -263,7 +263,7 @@ impl<const D: usize, L: Law> LinearizedMean<'_, D, L> {
         all.map(|((members, state), scale)| cell(members, state, scale)).collect()
     }
 
-    /// k δp, or k δv with δv = Σ V₀ J A : ∇u.
+    /// δp of every cell: as given, or k δv with δv = Σ V₀ J A : ∇u (γ δv in the mixed form).
     fn coupling(&self, along: Along<'_, D>) -> Vec<f64> {
         let volumes = match along {
             Along::Field(_, Some(pressures)) => return pressures.to_vec(),

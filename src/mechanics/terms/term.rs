@@ -167,7 +167,7 @@ pub(crate) trait MixedCells<const D: usize>: Sync {
     /// B u, the changes of the cells' volumes.
     fn volume_changes(&self, u: &[Vector<f64, D>]) -> Vec<f64>;
 
-    /// B_c D⁻¹ B_cᵀ of every cell, for a block-diagonal D⁻¹.
+    /// B_c M B_cᵀ of every cell, for a block-diagonal M.
     fn softness(&self, functions: &FunctionsAt<'_, D>, inverse: &[Tensor<f64, D>]) -> Vec<f64>;
 
     /// The cells in their order.

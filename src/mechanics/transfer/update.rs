@@ -250,7 +250,7 @@ impl<'a, const D: usize> Update<'a, D> {
         first
     }
 
-    /// Writes the new state to the particles, once per step. No other code of a step does so.
+    /// Writes the new state to the particles, once per step. No other code of a step changes positions, deformations or internal variables.
     pub fn commit<L: Law>(
         self,
         particles: &mut Particles<D>,

@@ -112,6 +112,8 @@ pub fn gmres(
             solution.copy_from_slice(&trial);
             r_norm = trial_norm;
             report.relative_residual = r_norm / b_norm;
+        } else {
+            true_residual(operator, rhs, solution, &mut r, &mut report)?;
         }
         if r_norm <= target {
             return Ok(report);

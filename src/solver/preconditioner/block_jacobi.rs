@@ -1,6 +1,7 @@
 //! Block-Jacobi: the inverses of the blocks on the diagonal.
 
 use super::Preconditioner;
+use crate::parallel;
 use crate::pooled::Pooled;
 use crate::solver::{LinearOperator, Linearization};
 use crate::tensor::{Tensor, Vector, determinant, inverse};
@@ -16,7 +17,7 @@ pub struct BlockJacobi<const D: usize> {
 }
 
 impl<const D: usize> BlockJacobi<D> {
-    /// Number of nodes.
+    /// Number of unknowns.
     pub(super) fn len(&self) -> usize {
         self.inverse.len() / D
     }
@@ -51,11 +52,20 @@ impl<const D: usize> LinearOperator for BlockJacobi<D> {
     }
 }
 
+/// Blocks in one part of the work of a thread.
+const PART: usize = 8192;
+
 /// z = M r for a matrix M of diagonal blocks.
 pub(super) fn multiply_blocks<const D: usize>(blocks: &[Tensor<f64, D>], r: &[f64], z: &mut [f64]) {
-    for ((block, r), z) in blocks.iter().zip(r.chunks_exact(D)).zip(z.chunks_exact_mut(D)) {
-        z.copy_from_slice((block * Vector::<f64, D>::from_column_slice(r)).as_slice());
-    }
+    let whole = D * blocks.len().min(r.len() / D).min(z.len() / D);
+    let r: &[Vector<f64, D>] = bytemuck::cast_slice(&r[..whole]);
+    let z: &mut [Vector<f64, D>] = bytemuck::cast_slice_mut(&mut z[..whole]);
+    let parts = blocks.chunks(PART).zip(r.chunks(PART)).zip(z.chunks_mut(PART));
+    parallel::for_each(parts, &|((blocks, r), z): ((&[_], &[_]), &mut [_])| {
+        for ((block, r), z) in blocks.iter().zip(r).zip(z) {
+            *z = block * r;
+        }
+    });
 }
 
 /// The inverse of a diagonal block. A node without stiffness and mass has a block that is singular to round-off. Such a block gives the

@@ -1,14 +1,14 @@
 //! Chebyshev polynomials over block-Jacobi, and the largest eigenvalue that they need.
 
 use crate::solver::LinearOperator;
-use crate::solver::vector::{axpy, dot, xpby};
+use crate::solver::vector::{axpy, dot, update, xpby};
 use nalgebra::DMatrix;
 
 /// A Chebyshev polynomial.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Chebyshev {
     pub degree: usize,
-    /// The polynomial damps the part [λ/part, λ] of the spectrum.
+    /// The polynomial damps eigenvalues between λ/part and λ.
     pub part: f64,
 }
 
@@ -17,7 +17,7 @@ impl Chebyshev {
     pub const SMOOTHER: Self = Self { degree: 5, part: 30.0 };
 }
 
-/// Number of products that estimate the largest eigenvalue λ of D⁻¹K.
+/// Iterations that estimate the largest eigenvalue λ of D⁻¹K, each with a product.
 const ESTIMATE: usize = 10;
 /// The estimate is a lower bound and is multiplied by this factor.
 const MARGIN: f64 = 1.15;
@@ -80,21 +80,21 @@ pub(super) fn smooth(
     let (mut r, mut z, mut p) = (b.to_vec(), vec![0.0; n], vec![0.0; n]);
     if !zero {
         operator.apply(x, &mut z);
-        r.iter_mut().zip(&z).for_each(|(r, z)| *r -= z);
+        axpy(-1.0, &z, &mut r);
     }
     jacobi(&r, &mut z);
-    p.iter_mut().zip(&z).for_each(|(p, z)| *p = z / theta);
+    update(&z, &mut p, |z, _| z / theta);
     let mut rho = 1.0 / sigma;
     for step in 0..degree {
-        x.iter_mut().zip(&p).for_each(|(x, p)| *x += p);
+        axpy(1.0, &p, x);
         if step + 1 == degree {
             break;
         }
         operator.apply(&p, &mut z);
-        r.iter_mut().zip(&z).for_each(|(r, z)| *r -= z);
+        axpy(-1.0, &z, &mut r);
         jacobi(&r, &mut z);
         let next = 1.0 / (2.0 * sigma - rho);
-        p.iter_mut().zip(&z).for_each(|(p, z)| *p = next * rho * *p + 2.0 * next / delta * z);
+        update(&z, &mut p, |z, p| next * rho * p + 2.0 * next / delta * z);
         rho = next;
     }
 }

@@ -28,7 +28,7 @@ const MOST: usize = 100;
 /// A cell with more than this share of its volume counts as full.
 const FULL: f64 = 0.999;
 
-/// The largest v̂, in volumes of the largest cell: a cell whose nodes are all held has none of its own.
+/// The largest v̂, in volumes of the largest cell. Where all nodes of a cell are held, B_c K_II⁻¹ B_cᵀ is 0.
 const STIFFEST: f64 = 100.0;
 
 /// The cells of a system in motions and pressures, one entry for each. Lengths are in the user's unit, unless they are said to be in cells.
@@ -36,6 +36,8 @@ const STIFFEST: f64 = 100.0;
 pub struct PressureCells {
     /// The nodes and the occupied cells of the grid, without tangents.
     pub occupied: LocalForm,
+    /// Whether the occupied cells and nodes have masses.
+    pub inertia: bool,
     /// Index of the cell; 0 along axes that do not exist.
     pub index: Vec<[u32; 3]>,
     /// Centroid, in cells from the origin of the grid.
@@ -46,14 +48,14 @@ pub struct PressureCells {
     pub volume: Vec<f64>,
     /// G
     pub shear: Vec<f64>,
-    /// B_c D⁻¹ B_cᵀ, with the diagonal blocks D of A + Bᵀ γ B.
+    /// B_c K_II⁻¹ B_cᵀ, with the diagonal blocks K_II of A + Bᵀ γ B.
     pub softness: Vec<f64>,
     /// k = 1/C, the change of pressure per change of volume.
     pub stiffness: Vec<f64>,
     /// γ
     pub augmented: Vec<f64>,
-    /// The change of pressure per unit of the unknown of the cell.
-    pub pressure: Vec<f64>,
+    /// The change of v that belongs to a unit of the unknown of the cell.
+    pub unit: Vec<f64>,
     /// The residual of the cell per difference of volumes.
     pub weight: Vec<f64>,
 }
@@ -110,7 +112,8 @@ impl<const D: usize> LinearOperator for Triangle<'_, D> {
         left.iter_mut().zip(&volumes).for_each(|(left, v)| *left -= v);
         self.schur.solve(&left, y);
         for (c, y) in y.iter_mut().enumerate() {
-            *y /= (1.0 - cells.augmented[c] / self.schur.stiffness(c)) * cells.pressure[c];
+            // δp = q/(1 − γ/k) = k unit y
+            *y /= (self.schur.stiffness(c) - cells.augmented[c]) * cells.unit[c];
         }
     }
 }
@@ -122,8 +125,11 @@ impl<const D: usize> LinearOperator for Triangle<'_, D> {
 /// S₀ = ½ d/2^d Σ_I b_I b_Iᵀ/a_I + Σ_I m_I m_Iᵀ/Σ (m_I/v),  S_m = Σ_I b_I b_Iᵀ/m_I
 /// ```
 ///
-/// Sums run over the nodes I of hat functions, whatever the functions of the body. b_I are the volume changes of the cells, a_I the stiffness of
-/// the node, m_c = v/(2^d 2 G v̂) for the 2^d cells at a node, and v̂ = v²/(G B_c D⁻¹ B_cᵀ) in units in which it is v in full cells. In full cells both
+/// Exactly, (B (A + Bᵀ γ B)⁻¹ Bᵀ)⁻¹ = (B A⁻¹ Bᵀ)⁻¹ + γ. Half of the first inverse comes from S₀, and half from each cell alone: S₀ vanishes on
+/// checkerboards and must not amplify them alone. Inertia adds an inverse (Cahouet and Chabard, Int. J. Numer. Methods Fluids 8, 1988).
+///
+/// S₀ is a model: sums run over the nodes I of hat functions, whatever the functions of the body. b_I are the volume changes of the cells, a_I the stiffness of
+/// the node, m_c = v/(2^d 2 G v̂) for the 2^d cells at a node, and v̂ = v²/(G B_c K_II⁻¹ B_cᵀ) over the median of v̂/v in full cells. In full cells both
 /// parts of S₀ add up to v/2G for waves along an axis, and both vanish for a checkerboard, as B Bᵀ does. S_m is that of the inertia of the nodes,
 /// and absent without inertia.
 #[derive(Debug)]
@@ -194,6 +200,7 @@ impl<const D: usize> Schur<D> {
             alone: Vec::new(),
             stiff: Coupled::default(),
             inert: None,
+            // The residual of a Chebyshev polynomial of degree n on [λ/part, λ] is about 2 exp(−2 n/√part), here 2 exp(−3.3).
             polynomial: Chebyshev { degree, part: (0.6 * degree as f64).powi(2) },
             cells,
         };
@@ -230,7 +237,7 @@ impl<const D: usize> Schur<D> {
 
     /// The inertia of every node; `None` without inertia.
     fn masses_of_nodes(&self) -> Option<Vec<f64>> {
-        let occupied = &self.cells.occupied;
+        let occupied = Some(&self.cells.occupied).filter(|_| self.cells.inertia)?;
         let blocks: &[Tensor<f64, D>] = bytemuck::cast_slice(&occupied.blocks);
         let mut masses: Vec<f64> = blocks.iter().map(|block| block[(0, 0)]).collect();
         let numbers: HashMap<[u32; 3], usize> = occupied.nodes.iter().copied().zip(0..).collect();
@@ -240,7 +247,7 @@ impl<const D: usize> Schur<D> {
                 masses[*node] += mass / f64::from(1 << D);
             }
         }
-        masses.iter().any(|mass| *mass > 0.0).then_some(masses)
+        Some(masses)
     }
 
     /// share Σ_I b_I b_Iᵀ/a_I
@@ -305,7 +312,7 @@ impl<const D: usize> Schur<D> {
     }
 }
 
-/// v̂ of every cell: v²/(G B_c D⁻¹ B_cᵀ), with the factor by which it is v in the median full cell.
+/// v̂ of every cell: v²/(G B_c K_II⁻¹ B_cᵀ), divided by the median of its ratio to v in full cells.
 fn effective_volumes(cells: &PressureCells) -> Vec<f64> {
     let occupied = &cells.occupied;
     let full: HashSet<[u32; 3]> = occupied
@@ -320,14 +327,16 @@ fn effective_volumes(cells: &PressureCells) -> Vec<f64> {
         let mut all: Vec<f64> = (0..cells.volume.len())
             .filter(|&c| chosen(c))
             .map(|c| raw(c) / cells.volume[c])
-            .filter(|x| x.is_finite())
+            .filter(|x| x.is_finite() && *x > 0.0)
             .collect();
         all.sort_unstable_by(f64::total_cmp);
         all.get(all.len() / 2).copied()
     };
     let unit = median(&|c| full.contains(&cells.index[c])).or_else(|| median(&|_| true)).unwrap_or(1.0);
     let largest = cells.volume.iter().copied().fold(0.0, f64::max);
-    (0..cells.volume.len()).map(|c| (raw(c) / unit).min(STIFFEST * largest)).collect()
+    // Softness is not positive where A + Bᵀ γ B is indefinite.
+    let effective = |c: usize| if raw(c) >= 0.0 { (raw(c) / unit).min(STIFFEST * largest) } else { cells.volume[c] };
+    (0..cells.volume.len()).map(effective).collect()
 }
 
 /// The volume change of each cell under a motion of each hat function, by cell and node. Outer nodes follow inner ones.
@@ -402,7 +411,7 @@ mod tests {
                 (&mut cells.softness, 1.0),
                 (&mut cells.stiffness, 1e12),
                 (&mut cells.augmented, 1.0),
-                (&mut cells.pressure, 1.0),
+                (&mut cells.unit, 1.0),
                 (&mut cells.weight, 1.0),
             ] {
                 list.push(value);
@@ -437,7 +446,7 @@ mod tests {
     fn inertia_adds_the_part_of_the_masses() {
         let mut cells = full(8);
         cells.occupied.cells = cells.index.clone();
-        cells.occupied.masses = vec![4.0; 64];
+        (cells.occupied.masses, cells.inertia) = (vec![4.0; 64], true);
         let schur = Schur::<2>::new(cells);
         let part = schur.inert.as_ref().map(|inert| inert.diagonal[27]);
         // Four nodes of mass 4, |b|² = ½

@@ -2,6 +2,7 @@
 
 use super::form::LocalForm;
 use crate::aggregation::{Extension, Followers, Occupied, Pieces};
+use crate::parallel;
 use crate::solver::LinearOperator;
 use crate::solver::preconditioner::block_jacobi::multiply_blocks;
 use crate::solver::preconditioner::chebyshev::largest;
@@ -12,6 +13,8 @@ use std::collections::HashMap;
 
 /// The middle of a stencil.
 const MIDDLE: usize = 13;
+/// Rows in one part of the work of a thread.
+const ROWS: usize = 512;
 /// The number of a neighbour that does not exist.
 const NONE: u32 = u32::MAX;
 
@@ -19,9 +22,9 @@ const NONE: u32 = u32::MAX;
 #[derive(Clone, Debug, Default)]
 pub(super) struct Level<const D: usize> {
     /// P: each node of the finer level as a weighted sum of nodes of this level.
-    above: Vec<Vec<(u32, f64)>>,
+    finer: Vec<Vec<(u32, f64)>>,
     /// Whether a value of the finer level is no unknown.
-    fixed_above: Vec<bool>,
+    fixed_finer: Vec<bool>,
     /// Whether a value of this level is zero, because it is prescribed or no cell reaches it.
     held: Vec<bool>,
     /// E: outer nodes, which follow others.
@@ -51,10 +54,13 @@ impl<const D: usize> LinearOperator for Level<D> {
 impl<const D: usize> Level<D> {
     /// K x
     fn multiply(&self, x: &[Vector<f64, D>], y: &mut [Vector<f64, D>]) {
-        for ((entries, neighbours), y) in self.entries.iter().zip(&self.neighbours).zip(y) {
-            let existing = entries.iter().zip(neighbours).filter(|(_, node)| **node != NONE);
-            *y = existing.fold(Vector::zeros(), |sum, (entry, &node)| sum + entry * x[node as usize]);
-        }
+        let rows = self.entries.chunks(ROWS).zip(self.neighbours.chunks(ROWS)).zip(y.chunks_mut(ROWS));
+        parallel::for_each(rows, &|((entries, neighbours), y): ((&[[_; 27]], &[[u32; 27]]), &mut [_])| {
+            for ((entries, neighbours), y) in entries.iter().zip(neighbours).zip(y) {
+                let existing = entries.iter().zip(neighbours).filter(|(_, node)| **node != NONE);
+                *y = existing.fold(Vector::zeros(), |sum, (entry, &node)| sum + entry * x[node as usize]);
+            }
+        });
     }
 }
 
@@ -81,7 +87,7 @@ impl<const D: usize> Level<D> {
     pub fn of(form: &LocalForm) -> (Self, LocalForm) {
         let mut next = LocalForm { grid: form.grid.map(|cells| cells.div_ceil(2)), ..LocalForm::default() };
         let mut numbers: HashMap<[u32; 3], u32> = HashMap::new();
-        let mut above = Vec::with_capacity(form.nodes.len());
+        let mut finer = Vec::with_capacity(form.nodes.len());
         for &index in &form.nodes {
             let list = between::<D>(index).map(|(coarse, weight)| {
                 let number = *numbers.entry(coarse).or_insert_with(|| {
@@ -90,7 +96,7 @@ impl<const D: usize> Level<D> {
                 });
                 (number, weight)
             });
-            above.push(list.collect());
+            finer.push(list.collect());
         }
         let neighbour = |index: [u32; 3], place: usize| {
             let steps = [place % 3, place / 3 % 3, place / 9];
@@ -99,11 +105,11 @@ impl<const D: usize> Level<D> {
         };
         let neighbours = next.nodes.iter().map(|&index| std::array::from_fn(|place| neighbour(index, place)));
         let mut level = Self {
-            held: Self::held(form, &above, next.nodes.len()),
+            held: Self::held(form, &finer, next.nodes.len()),
             neighbours: neighbours.collect(),
             entries: vec![[Tensor::zeros(); 27]; next.nodes.len()],
-            fixed_above: form.fixed(),
-            above,
+            fixed_finer: form.fixed(),
+            finer,
             ..Self::default()
         };
         let of_coarse = form.add_cells_to::<D>(&mut next);
@@ -122,16 +128,16 @@ impl<const D: usize> Level<D> {
 
     /// The held values of the coarse level. A coarse node that coincides with a finer node is held where that node is prescribed. Any other
     /// coarse node is held where one of the finer nodes interpolated from it is prescribed.
-    fn held(form: &LocalForm, above: &[Vec<(u32, f64)>], count: usize) -> Vec<bool> {
+    fn held(form: &LocalForm, finer: &[Vec<(u32, f64)>], count: usize) -> Vec<bool> {
         let (mut held, mut same) = (vec![false; D * count], vec![false; count]);
-        for (fine, list) in above.iter().enumerate() {
+        for (fine, list) in finer.iter().enumerate() {
             if let [(coarse, _)] = list[..] {
                 same[coarse as usize] = true;
                 (0..D).for_each(|i| held[coarse as usize * D + i] = form.prescribed[fine * D + i]);
                 mutant!("multigrid: coarse nodes that are held move": { (0..D).for_each(|i| held[coarse as usize * D + i] = false); });
             }
         }
-        for (fine, list) in above.iter().enumerate() {
+        for (fine, list) in finer.iter().enumerate() {
             for &(coarse, _) in list.iter().filter(|(coarse, _)| !same[*coarse as usize]) {
                 (0..D).for_each(|i| held[coarse as usize * D + i] |= form.prescribed[fine * D + i]);
             }
@@ -143,7 +149,7 @@ impl<const D: usize> Level<D> {
     fn add_nodes(&mut self, form: &LocalForm, next: &mut LocalForm) {
         let mut lumped = vec![Tensor::<f64, D>::zeros(); next.nodes.len()];
         let blocks: &[Tensor<f64, D>] = bytemuck::cast_slice(&form.blocks);
-        for (list, own) in self.above.iter().zip(blocks) {
+        for (list, own) in self.finer.iter().zip(blocks) {
             for &(a, of_a) in list {
                 lumped[a as usize] += own * of_a;
                 for &(b, of_b) in list {
@@ -291,9 +297,9 @@ impl<const D: usize> Level<D> {
 
     /// Calls `visit` with the entries of P: a value of the finer level that is an unknown, a value of this level, and the weight.
     fn each_weight(&self, mut visit: impl FnMut(usize, usize, f64)) {
-        for (fine, list) in self.above.iter().enumerate() {
+        for (fine, list) in self.finer.iter().enumerate() {
             for &(coarse, weight) in list {
-                for i in (0..D).filter(|i| !self.fixed_above[fine * D + i]) {
+                for i in (0..D).filter(|i| !self.fixed_finer[fine * D + i]) {
                     visit(fine * D + i, coarse as usize * D + i, weight);
                 }
             }
@@ -301,7 +307,7 @@ impl<const D: usize> Level<D> {
     }
 
     /// Eᵀ Pᵀ r
-    pub fn up(&self, r: &[f64]) -> Vec<f64> {
+    pub fn restrict(&self, r: &[f64]) -> Vec<f64> {
         let mut out = vec![0.0; D * self.neighbours.len()];
         self.each_weight(|fine, coarse, weight| out[coarse] += weight * r[fine]);
         self.followers.restrict::<f64>(bytemuck::cast_slice_mut(&mut out));
@@ -310,7 +316,7 @@ impl<const D: usize> Level<D> {
     }
 
     /// x += P E y
-    pub fn down(&self, mut y: Vec<f64>, x: &mut [f64]) {
+    pub fn prolong(&self, mut y: Vec<f64>, x: &mut [f64]) {
         self.followers.extend::<f64>(bytemuck::cast_slice_mut(&mut y));
         self.each_weight(|fine, coarse, weight| x[fine] += weight * y[coarse]);
     }

@@ -24,8 +24,6 @@ use nalgebra::{DVector, Dyn, LU};
 
 /// Coarsening ends at a level with at most this many unknowns, which is factorised.
 const BOTTOM: usize = 400;
-/// A last level with more unknowns than this is not factorised, and only gets block-Jacobi.
-const MOST: usize = 2000;
 
 /// One V-cycle of multigrid. Its levels are made from the first tangent it is prepared with. The finest level uses the present tangent.
 #[derive(Clone, Debug, Default)]
@@ -59,7 +57,7 @@ impl<const D: usize> Multigrid<D> {
             let (level, next) = Level::<D>::of(&form);
             let size = D * next.nodes.len();
             let last = size <= BOTTOM || next.grid.iter().all(|&cells| cells <= 1);
-            if last && size <= MOST {
+            if last {
                 let mut matrix = level.assembled();
                 rigid::hold::<D>(&mut matrix, &next.nodes, &next.fixed());
                 self.bottom = Some(matrix.lu());
@@ -104,7 +102,7 @@ impl<const D: usize> Multigrid<D> {
         let mut r = vec![0.0; b.len()];
         operator.apply(x, &mut r);
         xpby(b, -1.0, &mut r);
-        level.down(self.coarse(to, &level.up(&r)), x);
+        level.prolong(self.coarse(to, &level.restrict(&r)), x);
     }
 }
 

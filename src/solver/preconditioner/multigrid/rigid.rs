@@ -44,7 +44,7 @@ pub(super) fn hold<const D: usize>(matrix: &mut DMatrix<f64>, nodes: &[[u32; 3]]
         }
     }
     let energy = DMatrix::from_fn(motions.len(), motions.len(), |i, j| motions[i].dot(&(&*matrix * &motions[j])));
-    if energy.iter().any(|x| !x.is_finite()) {
+    if motions.is_empty() || energy.iter().any(|x| !x.is_finite()) {
         return;
     }
     let modes = (0.5 * (&energy + energy.transpose())).symmetric_eigen();
