@@ -79,8 +79,10 @@ pub struct CheckLaw {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Tangent {
     /// The Jaumann rate of the Kirchhoff stress over J, as Abaqus asks at finite strain.
+    #[value(alias = "jaumann_kirchhoff")]
     JaumannKirchhoff,
     /// The Jaumann rate of the Cauchy stress.
+    #[value(alias = "jaumann_cauchy")]
     JaumannCauchy,
     /// The derivative of the Cauchy stress by DSTRAN, with the rotation held: laws written for small strain.
     Strain,

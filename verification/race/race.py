@@ -33,7 +33,8 @@ The answers are the displacement along the load of the particle nearest to the m
 membrane's loaded side; the strain energy; the kinetic energy. Whether both programs solve the same equations is seen after the first
 step, when no grid has been reset.
 
-Not compared: more threads, snapshots and other output, convenience, and accuracy at equal time.
+Not compared: more threads, snapshots and other output, convenience, and accuracy at equal time. The script runs on Linux, with Python 3.9
+or newer.
 """
 
 from __future__ import annotations
@@ -209,8 +210,11 @@ def run_process(command: list[str], log: Path, limit: float) -> dict:
         try:
             _, status, usage = os.wait4(process.pid, 0)
         finally:
+            late = not timer.is_alive()
             timer.cancel()
         process.returncode = os.waitstatus_to_exitcode(status)
+    if late:
+        raise Failure(f"not ready after {limit:g} s")
     if process.returncode < 0:
         raise Failure(f"ended by {signal.Signals(-process.returncode).name}")
     if process.returncode:
@@ -387,7 +391,10 @@ def machine(options) -> dict:
     """What raced where."""
     info = Path("/proc/cpuinfo")
     models = re.findall(r"model name\s*: (.*)", info.read_text()) if info.exists() else []
-    version = subprocess.run([options.bfree, "--version"], capture_output=True, text=True, check=True).stdout.strip()
+    try:
+        version = subprocess.run([options.bfree, "--version"], capture_output=True, text=True, check=True).stdout.strip()
+    except (OSError, subprocess.CalledProcessError) as reason:
+        raise SystemExit(f"cannot run bfree: {reason}. Build it with `cargo build --release`, or give its path with --bfree.") from None
     return {
         "bfree": version,
         "Kratos": kratos_version(),
@@ -424,6 +431,23 @@ def as_json(one: Competitor) -> dict:
     return dataclasses.asdict(one) | {"problem": one.problem.name}
 
 
+def print_report(racers: list[Competitor], checks: list[dict], facts: dict, options) -> None:
+    """All tables, in Markdown."""
+    print(f"\n{facts['bfree']}, Kratos MPM {facts['Kratos'] or 'absent'}, Python {facts['python']}, {facts['system']},")
+    print(f"{facts['processor']}, {facts['cores']} cores, load {facts['load']}; --cells {options.cells} --repeat {options.repeat}\n")
+    print(times_table(racers))
+    print("\nCPU s, set-up and peak MB are medians; steps is CPU s without the set-up; Newton and linear are all iterations.")
+    if checks:
+        print("Kratos / this is the CPU time of the faster Kratos over that of the row, in all and of the steps alone.")
+    print("\nAnswers at the end, and the difference from bfree with linear functions:\n")
+    print(answers_table(racers))
+    if checks:
+        print("\nAnswers after the first step:\n")
+        print(first_step_table(checks) + "\n")
+        for name in options.problems:
+            print(f"- {name}: {DIFFERENCES[name]}")
+
+
 def main() -> None:
     options = parse_arguments()
     facts = machine(options)
@@ -437,18 +461,10 @@ def main() -> None:
         print(f"Kratos is not installed for this Python, so bfree races alone. To install it: {INSTALL}")
     race(racers, options)
     checks = first_step(racers, options) if facts["Kratos"] else []
-    print(f"\n{facts['bfree']}, Kratos MPM {facts['Kratos']}, Python {facts['python']}, {facts['system']},")
-    print(f"{facts['processor']}, {facts['cores']} cores, load {facts['load']}; --cells {options.cells} --repeat {options.repeat}\n")
-    print(times_table(racers))
-    print("\nAnswers at the end, and the difference from bfree with linear functions:\n")
-    print(answers_table(racers))
-    if checks:
-        print("\nAnswers after the first step:\n")
-        print(first_step_table(checks) + "\n")
-        for name in options.problems:
-            print(f"- {name}: {DIFFERENCES[name]}")
+    print_report(racers, checks, facts, options)
     if options.json:
-        numbers = {"machine": facts, "first step": checks, "competitors": [as_json(one) for one in racers]}
+        settings = {name: getattr(options, name) for name in ("cells", "repeat", "tolerance")}
+        numbers = {"machine": facts, "options": settings, "first step": checks, "competitors": [as_json(one) for one in racers]}
         options.json.write_text(json.dumps(numbers, indent=1) + "\n")
 
 

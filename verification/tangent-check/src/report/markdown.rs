@@ -28,7 +28,10 @@ pub(super) fn write(report: &Report, options: &Options) -> String {
     if !report.convention.is_empty() {
         text += &format!("\nConvention: {}\n", escaped(&report.convention));
     }
-    text + &format!("\nSeed of the states: {}\n", report.seed)
+    if report.seed > 0 {
+        text += &format!("\nSeed of the states: {}\n", report.seed);
+    }
+    text
 }
 
 /// All findings in a table that is folded up.

@@ -54,7 +54,9 @@ fn heading(lines: &mut Vec<String>, report: &Report) {
     if !report.convention.is_empty() {
         paragraph(lines, &format!("Convention: {}", report.convention));
     }
-    paragraph(lines, &format!("Seed of the states: {}", report.seed));
+    if report.seed > 0 {
+        paragraph(lines, &format!("Seed of the states: {}", report.seed));
+    }
     blank(lines);
 }
 
@@ -101,7 +103,7 @@ fn table(lines: &mut Vec<String>, findings: &[&Finding]) {
     paragraph(
         lines,
         "Deviation of the tangent and error of the differences: relative to the greatest entry. Seen: the smallest \
-         planted error that the check saw, relative to the spoiled entry.",
+         planted error that the check saw, relative to the spoiled entry; none is planted in a tangent that is wrong.",
     );
     blank(lines);
 }

@@ -116,13 +116,13 @@ pub(super) fn summary(report: &Report) -> Option<String> {
     let fewest = all.iter().map(|finding| finding.calls).min()?;
     let most = all.iter().map(|finding| finding.calls).max()?;
     let count = all.len();
-    let states = if count == 1 { "1 state is".to_owned() } else { format!("{count} states are") };
+    let all = if count == 1 { "1 is".to_owned() } else { format!("{count} are") };
     let cost = match (fewest, most) {
         (fewest, most) if fewest == most => format!("{} calls", calls(most)),
         _ => format!("{} to {} calls", calls(fewest), calls(most)),
     };
     Some(format!(
-        "{states} consistent: deviation ≤ {deviation} of the greatest entry, differences exact to {error}, planted errors seen from \
+        "{all} consistent: deviation ≤ {deviation} of the greatest entry, differences exact to {error}, planted errors seen from \
          {seen} on, {cost}{}.",
         if count == 1 { "" } else { " each" }
     ))
