@@ -2,14 +2,14 @@
 //!
 //! [`Simulation::is_mixed`](crate::simulation::Simulation) says when a step has this form: long steps of a nearly incompressible body.
 //!
-//! Where the volumetric stiffness κ is much larger than G, Newton's method in the motion alone takes many short steps, and the iterations of
+//! Where the volumetric stiffness κ is much larger than G, Newton's method in the displacements takes many short steps, and the iterations of
 //! its linear solver grow with κ/G. The mixed form has neither defect. Its residuals are
 //!
 //! ```text
 //! r_u = R(Δφ, π(Θ)),  r_v = v(Δφ) − Θ V_c,
 //! ```
 //!
-//! with the pressure π of [mean dilatation](crate::mechanics::terms). Where r_v = 0, the solution is that of the motion alone. With δp = π' δΘ
+//! with the pressure π of [mean dilatation](crate::mechanics::terms). Where r_v = 0, the solution is that of the displacement form, in the motion alone. With δp = π' δΘ
 //! the linear system is
 //!
 //! ```text

@@ -121,7 +121,7 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
         Ok((out, self.cell_residuals(picked, at)))
     }
 
-    /// The residuals of the averaged cells in the mixed form; empty in the form of motions alone.
+    /// The residuals of the averaged cells in the mixed form; empty in the displacement form.
     pub(crate) fn cell_residuals<T: Number>(&self, picked: impl Fn(&str, Role) -> bool, at: Trial<'_, T, D>) -> Vec<T> {
         let dphi = &*self.unknowns.extended(at.dphi);
         self.terms.cell_residuals(picked, Trial { dphi, ..at })

@@ -52,7 +52,7 @@ impl<const D: usize, L: Law, A> Simulation<D, L, A> {
     }
 
     /// Whether the dilatations of averaged cells are unknowns of their own: in long steps of a nearly incompressible body, unless the scene
-    /// asks for a solver that needs motions alone.
+    /// asks for a solver of the displacement form.
     pub(crate) fn is_mixed(&self) -> bool {
         let settings = &self.settings;
         let solver = matches!(settings.preconditioner, Preconditioning::Automatic | Preconditioning::Multigrid)

@@ -1,4 +1,4 @@
-//! Nearly incompressible bodies: the mixed form gives the answer of the form of motions alone, in iterations that depend neither on ν nor on h.
+//! Nearly incompressible bodies: the mixed form gives the answer of the displacement form, in iterations that depend neither on ν nor on h.
 
 use crate::support::{Failure, advance, run_to, scene};
 use bfree::plan::Plan;
@@ -109,7 +109,7 @@ fn the_product_of_the_mixed_form_is_the_derivative_of_its_residuals() -> Result<
     Ok(())
 }
 
-/// A preconditioner of motions alone serves systems without pressures as before.
+/// For a system without pressures, the preconditioner is that of the motions.
 #[test]
 fn a_saddle_over_motions_is_the_preconditioner_of_motions() -> Result<(), Failure> {
     let pointwise = r#"bodies.0.volumetric="pointwise""#;

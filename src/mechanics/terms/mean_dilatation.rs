@@ -103,7 +103,7 @@ impl<'a, const D: usize, L: Law> MeanDilatation<'a, D, L> {
 }
 
 impl<const D: usize, L: Law> MeanDilatation<'_, D, L> {
-    /// G/h (v − Θ V_c) of every cell in the mixed form, with Θ from its own unknown; empty in the form of motions alone.
+    /// G/h (v − Θ V_c) of every cell in the mixed form, with Θ from its own unknown; empty in the displacement form.
     pub(super) fn residuals<T: Number>(&self, at: Trial<'_, T, D>) -> Vec<T> {
         if at.dilatation.is_empty() {
             return Vec::new();

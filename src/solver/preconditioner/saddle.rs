@@ -104,13 +104,13 @@ impl<const D: usize> LinearOperator for Triangle<'_, D> {
         let pressures: Vec<f64> = volumes.iter().zip(&cells.augmented).map(|(v, gamma)| v * gamma).collect();
         let mut f = vec![0.0; nodal];
         self.system.forces(&pressures, &mut f);
-        mutant!("saddle: the motions do not see the residual of the volumes": { f.fill(0.0); });
         f.iter_mut().zip(r_u).for_each(|(f, r)| *f += r);
         self.motions.apply(&f, u);
         let mut left = vec![0.0; volumes.len()];
         self.system.volume_changes(u, &mut left);
         left.iter_mut().zip(&volumes).for_each(|(left, v)| *left -= v);
         self.schur.solve(&left, y);
+        mutant!("saddle: the pressures have the other sign": { y.iter_mut().for_each(|y| *y = -*y); });
         for (c, y) in y.iter_mut().enumerate() {
             // δp = q/(1 − γ/k) = k unit y
             *y /= (self.schur.stiffness(c) - cells.augmented[c]) * cells.unit[c];

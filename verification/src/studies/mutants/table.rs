@@ -157,7 +157,7 @@ pub(super) const FAULTS: &[ShippedFault] = &[
     fault("multigrid: held values lead others in the matrix of the bottom level", LEVELS, POINTS),
     fault("multigrid: motions that nothing holds have no stiffness", STATICS, LEVELS),
     fault("saddle: cells are alone in the Schur complement", INCOMPRESSIBLE, LEVELS),
-    fault("saddle: the motions do not see the residual of the volumes", INCOMPRESSIBLE, LEVELS),
+    fault("saddle: the pressures have the other sign", INCOMPRESSIBLE, LEVELS),
     fault("solids: a curved surface by one plane a box", SOLIDS, PATCH),
     fault("solids: slivers are left alone", SOLIDS, PATCH),
     fault("solids: the gap between planes and a curved surface is left out", SOLIDS, PATCH),
