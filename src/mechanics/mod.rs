@@ -9,6 +9,7 @@ mod local_form;
 pub mod mass;
 pub(crate) mod mixed;
 pub mod path;
+mod problem;
 pub mod reference;
 pub mod residual;
 pub mod rigid;

@@ -3,7 +3,6 @@
 use crate::lanes::LANES;
 use crate::material::Law;
 use crate::mechanics::constitutive::{Form, Laws};
-use crate::mechanics::mixed::MixedTangent;
 use crate::mechanics::residual::{Equilibrium, Inadmissible};
 use crate::mechanics::sweep::{Group, Mode, Quadratic, Supports};
 use crate::mechanics::terms::{Along, Linearized, MixedCells, Piece};
@@ -11,7 +10,7 @@ use crate::mechanics::trial::Trial;
 use crate::mechanics::unknowns::Unknowns;
 use crate::particles::{Body, Particles};
 use crate::pooled::Pooled;
-use crate::solver::{LinearOperator, Linearization, LocalForm, NonlinearProblem};
+use crate::solver::{LinearOperator, Linearization, LocalForm};
 use crate::tensor::{Tensor, Vector};
 use num_dual::Dual64;
 
@@ -225,44 +224,5 @@ impl<const D: usize> Linearization for Tangent<'_, D> {
 
     fn local_form(&self) -> Option<LocalForm> {
         Some(self.on_cells())
-    }
-}
-
-impl<const D: usize, L: Law> NonlinearProblem for Equilibrium<'_, D, L> {
-    type Inadmissible = Inadmissible;
-    fn residual(&self, x: &[f64], r: &mut [f64]) -> Result<(), Inadmissible> {
-        let at = self.trial(x);
-        let (nodes, cells) = r.split_at_mut(D * at.dphi.len());
-        let residual = bytemuck::cast_slice_mut(nodes);
-        self.residual_into(at, residual)?;
-        self.unknowns.clear_prescribed(residual);
-        cells.copy_from_slice(&self.cell_residuals(|_, _| true, at));
-        Ok(())
-    }
-
-    fn magnitude(&self, x: &[f64]) -> Result<f64, Inadmissible> {
-        self.magnitude_at(self.trial(x))
-    }
-
-    fn sensitivity(&self, x: &[f64]) -> Result<f64, Inadmissible> {
-        self.sensitivity_at(self.trial(x))
-    }
-
-    /// None in the mixed form: its solution is a saddle point.
-    fn potential(&self, x: &[f64]) -> Option<Result<(f64, f64), Inadmissible>> {
-        if self.mixed { None } else { Self::potential::<f64>(self, bytemuck::cast_slice(x)) }
-    }
-
-    fn is_symmetric(&self) -> bool {
-        Self::is_symmetric(self)
-    }
-
-    fn is_stopped(&self) -> bool {
-        self.stop.is_some_and(|stop| stop.0())
-    }
-
-    fn linearize(&self, x: &[f64]) -> Result<Box<dyn Linearization + '_>, Inadmissible> {
-        let tangent = self.tangent_at(None, self.trial(x))?;
-        Ok(if self.mixed { Box::new(MixedTangent { tangent }) } else { Box::new(tangent) })
     }
 }

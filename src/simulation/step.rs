@@ -58,10 +58,8 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         // Forces are in balance at t_n + θ Δt. The motion is extrapolated to t_{n+1}.
         let (mut dphi, theta) = (phi, scheme.instant());
         dphi.iter_mut().zip(nodal.moved(nodes.len())).for_each(|(dphi, before)| *dphi = (*dphi - before) / theta);
-        if theta < 1.0 {
-            // Dilatations that are extrapolated, too, would drift from the motion.
-            after.clear();
-        }
+        // Dilatations that are extrapolated, too, would drift from the motion.
+        after.truncate(if theta < 1.0 { 0 } else { after.len() });
         mutant!("step: Δφ is the motion to the balance, not to the end": { dphi.iter_mut().for_each(|dphi| *dphi *= theta); });
 
         let update = Update::new(&scheme.end(dt), &projected, &nodal, &prescribed, self.settings.wall_update, &dphi);

@@ -29,7 +29,7 @@ const SPACE: [f64; 3] = [0.2, 0.1, 0.05];
 /// The most iterations for steps of 1 to 1000 Courant numbers.
 const MOST_IN_TIME: f64 = 20.0;
 
-/// The smallest spacing in 2D and in 3D at which diagonal blocks are shown beside multigrid: their iterations double at each refinement.
+/// The smallest spacing in 2D and in 3D at which full effort shows diagonal blocks beside multigrid: their iterations double at each refinement.
 const LEAST_SPACING: [f64; 2] = [0.025, 0.1];
 
 /// The largest over the smallest count, for all positions of the body in a cell.
@@ -152,8 +152,8 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
             // The other bodies differ by their cut cells, which coarse grids have too.
             let finest = *effort == Effort::Full && shape == Shape::Block;
             let [plane, space] = [PLANE.len(), SPACE.len()].map(|all| if finest { all } else { all - 1 });
-            refinement::<2>((name, &family), (shape, body), &PLANE[..plane], &mut refined)?;
-            refinement::<3>((name, &family), (shape, body), &SPACE[..space], &mut refined)?;
+            refinement::<2>((name, &family), (shape, body), (&PLANE[..plane], finest), &mut refined)?;
+            refinement::<3>((name, &family), (shape, body), (&SPACE[..space], finest), &mut refined)?;
         }
     }
     let mut others = Report::new("iterations where systems are hard, block in the plane", &["quantity", "shape", "at"]);
@@ -171,7 +171,7 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
 fn refinement<const D: usize>(
     (name, family): (&str, &Value),
     (shape, body): (Shape, &str),
-    spacings: &[f64],
+    (spacings, beside): (&[f64], bool),
     report: &mut Report,
 ) -> Result<(), StudyError> {
     let (dimension, mut before) = (D.to_string(), None);
@@ -187,7 +187,7 @@ fn refinement<const D: usize>(
         {
             report.push(&with("growth"), count / before, Bound::AtMost(GROWTH));
         }
-        if shape == Shape::Block && h >= LEAST_SPACING[D - 2] {
+        if beside && h >= LEAST_SPACING[D - 2] {
             push(report, &with("with diagonal blocks"), simulation, Preconditioning::BlockJacobi, Bound::Reported);
         }
     }
