@@ -92,6 +92,9 @@
 //!     + α₄ (a M̃ + b K_n) u            damping
 //! ```
 //!
+//! [`Simulation::preconditioner`](simulation::Simulation::preconditioner) chooses the preconditioner: multigrid without inertia, block-Jacobi
+//! where inertia dominates. Nearly incompressible bodies with mean dilatation have a mixed form (`mechanics/mixed.rs`).
+//!
 //! The block-Jacobi preconditioner inverts the blocks on the diagonal of K. In these blocks the tangent is *B-free* (34), (37), (38):
 //! second-order tensors ℂmat take the place of Voigt's matrices BᵀDB,
 //!

@@ -9,8 +9,8 @@
 //! r_u = R(Δφ, π(Θ)),  r_v = v(Δφ) − Θ V_c,
 //! ```
 //!
-//! with the pressure π of [mean dilatation](crate::mechanics::terms). Where r_v = 0, the solution is that of the displacement form, in the motion alone. With δp = π' δΘ
-//! the linear system is
+//! with the pressure π of [mean dilatation](crate::mechanics::terms). Where r_v = 0, the solution is that of the displacement form, which has the
+//! motion alone. With δp = π' δΘ the linear system is
 //!
 //! ```text
 //! [A  Bᵀ] [δu]     [r_u]

@@ -51,7 +51,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let nodal = projected.with_prescribed(&prescribed).extended(&Unknowns::new(&supports, &prescribed));
         watch.lap(Phase::Projection, supports.passes());
 
-        let Balance { equilibrium, phi, dilatation: [before, mut after], newton, load, straight } =
+        let Balance { equilibrium, phi, dilatation: [before, after], newton, load, straight } =
             self.balance(&supports, &nodal, &prescribed)?;
         watch.lap(Phase::Newton, supports.passes());
         self.check_tangent(&equilibrium, Trial { dphi: &phi, dilatation: &after })?;
@@ -59,7 +59,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let (mut dphi, theta) = (phi, scheme.instant());
         dphi.iter_mut().zip(nodal.moved(nodes.len())).for_each(|(dphi, before)| *dphi = (*dphi - before) / theta);
         // Dilatations that are extrapolated, too, would drift from the motion.
-        after.truncate(if theta < 1.0 { 0 } else { after.len() });
+        let after = if theta < 1.0 { Vec::new() } else { after };
         mutant!("step: Δφ is the motion to the balance, not to the end": { dphi.iter_mut().for_each(|dphi| *dphi *= theta); });
 
         let update = Update::new(&scheme.end(dt), &projected, &nodal, &prescribed, self.settings.wall_update, &dphi);

@@ -3,7 +3,7 @@
 use crate::support::{Failure, advance, run_to, scene};
 use bfree::plan::Plan;
 use bfree::simulation::{Simulation, StepReport};
-use bfree::solver::{Preconditioning, Saddle};
+use bfree::solver::Preconditioning;
 use std::num::NonZeroU64;
 
 const CUBIC: &str = r#"{"bspline":{"degree":3}}"#;
@@ -34,10 +34,11 @@ fn apart<const D: usize>(a: &Simulation<D>, b: &Simulation<D>, start: &Simulatio
     most(&mut a.iter().zip(&b).map(|(a, b)| (a - b).norm())) / moved
 }
 
-/// Up to κ/G of half a million, the whole load in one step.
+/// Up to κ/G of half a million, the whole load in one step. The bounds are a tenth above what is measured; the displacement form takes thousands of
+/// iterations and fails.
 #[test]
 fn iterations_depend_neither_on_the_bulk_modulus_nor_on_the_grid() -> Result<(), Failure> {
-    for (approximation, least) in [("\"linear\"", 100), (CUBIC, 140)] {
+    for (approximation, most) in [("\"linear\"", 73), (CUBIC, 120)] {
         let mut all = Vec::new();
         for spacing in [4.0, 2.0] {
             for poisson in [0.49, 0.4999, 0.499999] {
@@ -50,14 +51,14 @@ fn iterations_depend_neither_on_the_bulk_modulus_nor_on_the_grid() -> Result<(),
         assert!(newton.iter().all(|&n| n <= 8), "{approximation}: {newton:?}");
         // Flat in κ from 5000 G on.
         assert!(krylov.chunks(3).all(|of| of[2].abs_diff(of[1]) * 20 <= of[1]), "{approximation}: {krylov:?}");
-        assert!(krylov.iter().all(|&k| k <= least), "{approximation}: {krylov:?}");
+        assert!(krylov.iter().all(|&k| k <= most), "{approximation}: {krylov:?}");
     }
     Ok(())
 }
 
 /// In load steps, and in steps of inertia at a large Courant number.
 #[test]
-fn the_mixed_form_gives_the_answer_of_motions_alone() -> Result<(), Failure> {
+fn the_mixed_form_gives_the_answer_of_the_displacement_form() -> Result<(), Failure> {
     let tight = "solver.newton.tolerance=1e-11";
     let dynamic = [
         r#"time={"step":0.02,"end":0.04,"scheme":{"generalized_alpha":{"spectral_radius":0.8}}}"#,
@@ -75,7 +76,7 @@ fn the_mixed_form_gives_the_answer_of_motions_alone() -> Result<(), Failure> {
         assert!(Plan::of(&start)?.krylov.1.contains("averaged cells"), "{}", Plan::of(&start)?);
         assert!(Plan::of(&motions)?.unknowns < Plan::of(&mixed)?.unknowns);
         let apart = apart(&mixed, &motions, &start);
-        assert!(apart < 1e-7, "ν = {poisson}: {apart:e}");
+        assert!(apart < 1e-10, "ν = {poisson}: {apart:e}");
     }
     Ok(())
 }
@@ -106,29 +107,5 @@ fn the_product_of_the_mixed_form_is_the_derivative_of_its_residuals() -> Result<
         assert!(Plan::of(&block)?.terms.iter().any(|term| term.name == "dilatation of cells" && term.used));
         run_to(&mut block, 1.0)?;
     }
-    Ok(())
-}
-
-/// For a system without pressures, the preconditioner is that of the motions.
-#[test]
-fn a_saddle_over_motions_is_the_preconditioner_of_motions() -> Result<(), Failure> {
-    let pointwise = r#"bodies.0.volumetric="pointwise""#;
-    let simulation = membrane(0.3, 6.0, "\"linear\"", &[pointwise])?;
-    let supports = bfree::mechanics::sweep::Supports::new(
-        &simulation.approximation,
-        &simulation.grid,
-        &simulation.particles.position,
-    )?
-    .0;
-    let nodal = bfree::mechanics::transfer::Nodal::default();
-    let equilibrium = simulation.equilibrium(&supports, &nodal, &[], bfree::mechanics::schemes::Alphas::START, 0.0);
-    let tangent = equilibrium.tangent(&vec![bfree::tensor::Vector::zeros(); supports.nodes()])?;
-    let r: Vec<f64> = (0..2 * supports.nodes()).map(|k| (k as f64).sin()).collect();
-    let [mut one, mut other] = [vec![0.0; r.len()], vec![0.0; r.len()]];
-    Preconditioning::BlockJacobi.anew::<2>().prepare(&tangent).apply(&r, &mut one);
-    Saddle::<2>::over(Preconditioning::BlockJacobi.anew::<2>());
-    let mut saddle = Saddle::<2>::over(Preconditioning::BlockJacobi.anew::<2>());
-    bfree::solver::Preconditioner::prepare(&mut saddle, &tangent).apply(&r, &mut other);
-    assert_eq!(one, other);
     Ok(())
 }

@@ -1,6 +1,7 @@
 use super::super::testing::{Dense, distance, irregular};
 use super::super::{Identity, LinearOutcome};
 use super::*;
+use std::cell::Cell;
 
 /// Solves with a memory pool of its own.
 fn gmres(
@@ -239,4 +240,40 @@ fn wrong_settings_and_lengths_are_named() {
     assert!(solve(GmresSettings { restart: 0, ..TIGHT }, 3).contains("restart is 0e0; it must be at least 1"));
     assert!(solve(GmresSettings { relative_tolerance: f64::NAN, ..TIGHT }, 3).contains("relative_tolerance"));
     assert!(solve(TIGHT, 4).contains("3 entries and the solution 4"));
+}
+
+/// The identity, except that one application has the wrong sign.
+struct Lapse {
+    at: usize,
+    count: Cell<usize>,
+}
+
+impl LinearOperator for Lapse {
+    fn apply(&self, r: &[f64], z: &mut [f64]) {
+        self.count.set(self.count.get() + 1);
+        let sign = if self.count.get() == self.at { -1.0 } else { 1.0 };
+        z.iter_mut().zip(r).for_each(|(z, r)| *z = sign * r);
+    }
+}
+
+#[test]
+fn a_cycle_that_is_undone_leaves_its_residual_behind() {
+    // A turn of four entries: no Krylov space of less than four vectors has a better solution than 0, so the first cycle, of two, is too short.
+    let a = Dense::from_fn(4, |i, j| {
+        if j == (i + 1) % 4 {
+            1.0
+        } else if i == j {
+            0.4
+        } else {
+            0.0
+        }
+    });
+    let b = [0.0, 0.0, 0.0, 1.0];
+    let settings = GmresSettings { restart: 2, ..TIGHT };
+    // The third application makes the correction of the first cycle.
+    let (mut x, lapse) = ([0.0; 4], Lapse { at: 3, count: Cell::new(0) });
+    let report = gmres(&a, &lapse, &b, &mut x, &settings).unwrap();
+    // The second cycle, of four, starts from the right residual and solves the system.
+    assert!(report.converged() && report.iterations == 6, "{report:?}");
+    assert!(check(&a, &b, &x) < 1e-12);
 }

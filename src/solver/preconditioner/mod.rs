@@ -2,6 +2,7 @@
 
 mod block_jacobi;
 mod chebyshev;
+mod hats;
 mod multigrid;
 mod saddle;
 

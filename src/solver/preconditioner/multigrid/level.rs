@@ -6,6 +6,7 @@ use crate::parallel;
 use crate::solver::LinearOperator;
 use crate::solver::preconditioner::block_jacobi::multiply_blocks;
 use crate::solver::preconditioner::chebyshev::largest;
+use crate::solver::preconditioner::hats::corners;
 use crate::tensor::{Tensor, Vector, identity, inverse};
 use nalgebra::DMatrix;
 use std::borrow::Cow;
@@ -170,19 +171,10 @@ impl<const D: usize> Level<D> {
         at: usize,
         numbers: &HashMap<[u32; 3], u32>,
     ) {
-        let (index, tiles) = (next.cells[at], D.pow(4));
-        let local = |k: usize| (0.5 * form.centres[cell][k] - f64::from(index[k])).clamp(0.0, 1.0);
-        let corner = |corner: usize| {
-            let upper = |k: usize| corner >> k & 1 == 1;
-            let hat = |k: usize| if upper(k) { local(k) } else { 1.0 - local(k) };
-            let slope = |k: usize| {
-                let others: f64 = (0..D).filter(|&other| other != k).map(hat).product();
-                if upper(k) { others } else { -others }
-            };
-            let node = numbers.get(&std::array::from_fn(|k| index[k] + u32::from(k < D && upper(k))))?;
-            Some((*node as usize, (0..D).map(hat).product::<f64>(), std::array::from_fn::<f64, D, _>(slope)))
-        };
-        let corners: Vec<_> = (0..1_usize << D).filter_map(corner).collect();
+        let tiles = D.pow(4);
+        let corners: Vec<_> = corners::<D>(next.cells[at], form.centres[cell].map(|x| 0.5 * x))
+            .filter_map(|(node, n, slope)| Some((*numbers.get(&node)? as usize, n, slope)))
+            .collect();
         let tangent = &form.tangents[cell * tiles..(cell + 1) * tiles];
         for &(b, n_b, slope_b) in &corners {
             for &(a, n_a, slope_a) in &corners {

@@ -56,3 +56,31 @@ pub(super) fn hold<const D: usize>(matrix: &mut DMatrix<f64>, nodes: &[[u32; 3]]
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_what_nothing_holds_is_held() {
+        // Two nodes and a spring: the difference has a stiffness, the common motion has none.
+        let free = DMatrix::from_row_slice(2, 2, &[1.0, -1.0, -1.0, 1.0]);
+        let nodes = [[0, 0, 0], [1, 0, 0]];
+        let mut held = free.clone();
+        hold::<1>(&mut held, &nodes, &[false; 2]);
+        assert!(
+            (&held * DVector::from_vec(vec![1.0, -1.0]) - &free * DVector::from_vec(vec![1.0, -1.0])).amax() < 1e-15
+        );
+        assert!((held * DVector::from_vec(vec![1.0, 1.0]) - DVector::from_vec(vec![1.0, 1.0])).amax() < 1e-15);
+        // A spring to the ground, no unknown at all, and a matrix without positive diagonal stay as they are.
+        for (diagonal, fixed) in
+            [([2.0, 1.0], false), ([1.0, 1.0], true), ([-1.0, -1.0], false), ([f64::NAN, 1.0], false)]
+        {
+            let mut matrix = free.clone();
+            matrix.set_diagonal(&DVector::from_column_slice(&diagonal));
+            let before = matrix.clone();
+            hold::<1>(&mut matrix, &nodes, &[fixed; 2]);
+            assert!(matrix.iter().zip(&before).all(|(a, b)| a.to_bits() == b.to_bits()), "{diagonal:?}");
+        }
+    }
+}

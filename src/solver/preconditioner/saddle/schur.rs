@@ -1,64 +1,16 @@
-//! A preconditioner for systems in motions and pressures, [A Bᵀ; B −C]. The iterations of GMRES depend neither on C nor much on the grid.
-//!
-//! With γ of the cells, the system is equivalent to
-//!
-//! ```text
-//! [A + Bᵀ γ B  Bᵀ ] [u]   [r_u + Bᵀ γ r_v]
-//! [B           −C′] [q] = [r_v           ],   q = (1 − γ C) p,  C′ = C/(1 − γ C).
-//! ```
-//!
-//! Its lower triangle is solved with approximate inverses: multigrid for A + Bᵀ γ B, and a Schur complement S for B (A + Bᵀ γ B)⁻¹ Bᵀ + C′:
-//!
-//! ```text
-//! u = M⁻¹ (r_u + Bᵀ γ r_v),  q = −S⁻¹ (r_v − B u)
-//! ```
+//! The approximate Schur complement of a system in motions and pressures.
 
-use super::chebyshev::{Chebyshev, largest, smooth};
-use super::{LocalForm, Preconditioner};
-use crate::aggregation::{Extension, Followers, Occupied, Pieces};
-use crate::solver::{LinearOperator, Linearization, SaddlePoint};
+use super::cells::PressureCells;
+use crate::solver::LinearOperator;
+use crate::solver::preconditioner::chebyshev::{Chebyshev, largest, smooth};
+use crate::solver::preconditioner::hats::nodes_of;
 use crate::tensor::{Tensor, Vector};
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 
 /// Bounds of the degree of the polynomials that invert coupled parts of the Schur complement. Between them it is the number of cells across the
 /// grid.
 const LEAST: usize = 24;
 const MOST: usize = 100;
-
-/// A cell with more than this share of its volume counts as full.
-const FULL: f64 = 0.999;
-
-/// The largest v̂, in volumes of the largest cell. Where all nodes of a cell are held, B_c K_II⁻¹ B_cᵀ is 0.
-const STIFFEST: f64 = 100.0;
-
-/// The cells of a system in motions and pressures, one entry for each. Lengths are in the user's unit, unless they are said to be in cells.
-#[derive(Clone, Debug, Default)]
-pub struct PressureCells {
-    /// The nodes and the occupied cells of the grid, without tangents.
-    pub occupied: LocalForm,
-    /// Whether the occupied cells and nodes have masses.
-    pub inertia: bool,
-    /// Index of the cell; 0 along axes that do not exist.
-    pub index: Vec<[u32; 3]>,
-    /// Centroid, in cells from the origin of the grid.
-    pub centroid: Vec<[f64; 3]>,
-    /// ∂v/∂(∇u) with gradients in units of 1/h, D×D, column by column.
-    pub pull: Vec<f64>,
-    /// v
-    pub volume: Vec<f64>,
-    /// G
-    pub shear: Vec<f64>,
-    /// B_c K_II⁻¹ B_cᵀ, with the diagonal blocks K_II of A + Bᵀ γ B.
-    pub softness: Vec<f64>,
-    /// k = 1/C, the change of pressure per change of volume.
-    pub stiffness: Vec<f64>,
-    /// γ
-    pub augmented: Vec<f64>,
-    /// The change of v that belongs to a unit of the unknown of the cell.
-    pub unit: Vec<f64>,
-    /// The residual of the cell per difference of volumes.
-    pub weight: Vec<f64>,
-}
 
 /// Bytes of the Schur complement of `cells` cells.
 pub(crate) fn bytes(cells: usize, dimension: usize) -> usize {
@@ -67,74 +19,23 @@ pub(crate) fn bytes(cells: usize, dimension: usize) -> usize {
     cells * (corners * (4 * index + (dimension + 1) * number) + 3 * index + (dimension.pow(2) + 18) * number)
 }
 
-/// The block-triangular preconditioner over a preconditioner of A + Bᵀ γ B. For systems without pressures it is that preconditioner.
-pub struct Saddle<const D: usize> {
-    motions: Box<dyn Preconditioner>,
-    schur: Option<Schur<D>>,
-}
-
-impl<const D: usize> Saddle<D> {
-    /// The preconditioner over one of A + Bᵀ γ B.
-    pub fn over(motions: Box<dyn Preconditioner>) -> Self {
-        Self { motions, schur: None }
-    }
-}
-
-impl<const D: usize> Preconditioner for Saddle<D> {
-    fn prepare<'a>(&'a mut self, tangent: &'a dyn Linearization) -> Box<dyn LinearOperator + 'a> {
-        let Some(system) = tangent.saddle_point() else { return self.motions.prepare(tangent) };
-        let schur = self.schur.get_or_insert_with(|| Schur::new(system.cells()));
-        Box::new(Triangle { system, schur, motions: self.motions.prepare(system.augmented()) })
-    }
-}
-
-/// The solve with the lower triangle.
-struct Triangle<'a, const D: usize> {
-    system: &'a dyn SaddlePoint,
-    schur: &'a Schur<D>,
-    motions: Box<dyn LinearOperator + 'a>,
-}
-
-impl<const D: usize> LinearOperator for Triangle<'_, D> {
-    fn apply(&self, r: &[f64], z: &mut [f64]) {
-        let cells = &self.schur.cells;
-        let nodal = r.len() - cells.volume.len();
-        let ((r_u, r_c), (u, y)) = (r.split_at(nodal), z.split_at_mut(nodal));
-        let volumes: Vec<f64> = r_c.iter().zip(&cells.weight).map(|(r, weight)| r / weight).collect();
-        let pressures: Vec<f64> = volumes.iter().zip(&cells.augmented).map(|(v, gamma)| v * gamma).collect();
-        let mut f = vec![0.0; nodal];
-        self.system.forces(&pressures, &mut f);
-        f.iter_mut().zip(r_u).for_each(|(f, r)| *f += r);
-        self.motions.apply(&f, u);
-        let mut left = vec![0.0; volumes.len()];
-        self.system.volume_changes(u, &mut left);
-        left.iter_mut().zip(&volumes).for_each(|(left, v)| *left -= v);
-        self.schur.solve(&left, y);
-        mutant!("saddle: the pressures have the other sign": { y.iter_mut().for_each(|y| *y = -*y); });
-        for (c, y) in y.iter_mut().enumerate() {
-            // δp = q/(1 − γ/k) = k unit y
-            *y /= (self.schur.stiffness(c) - cells.augmented[c]) * cells.unit[c];
-        }
-    }
-}
-
 /// The approximate inverse of the Schur complement,
 ///
 /// ```text
 /// S⁻¹ = ½ (S₀ + C′)⁻¹ + (C′ + v²/(G v̂ + γ v²))⁻¹ + (S_m + C′)⁻¹
-/// S₀ = ½ d/2^d Σ_I b_I b_Iᵀ/a_I + Σ_I m_I m_Iᵀ/Σ (m_I/v),  S_m = Σ_I b_I b_Iᵀ/m_I
+/// S₀ = ½ d/2^d Σ_I b_I b_Iᵀ/a_I + Σ_I m_I m_Iᵀ/Σ (m_I/v),  S_m = Σ_I b_I b_Iᵀ/M_I
 /// ```
 ///
 /// Exactly, (B (A + Bᵀ γ B)⁻¹ Bᵀ)⁻¹ = (B A⁻¹ Bᵀ)⁻¹ + γ. Half of the first inverse comes from S₀, and half from each cell alone: S₀ vanishes on
 /// checkerboards and must not amplify them alone. Inertia adds an inverse (Cahouet and Chabard, Int. J. Numer. Methods Fluids 8, 1988).
 ///
-/// S₀ is a model: sums run over the nodes I of hat functions, whatever the functions of the body. b_I are the volume changes of the cells, a_I the stiffness of
-/// the node, m_c = v/(2^d 2 G v̂) for the 2^d cells at a node, and v̂ = v²/(G B_c K_II⁻¹ B_cᵀ) over the median of v̂/v in full cells. In full cells both
-/// parts of S₀ add up to v/2G for waves along an axis, and both vanish for a checkerboard, as B Bᵀ does. S_m is that of the inertia of the nodes,
-/// and absent without inertia.
+/// S₀ is a model: sums run over the nodes I of hat functions, whatever the functions of the body. b_I are the volume changes of the cells, a_I
+/// the stiffness of the node, m_c = v/(2^d 2 G v̂) for the 2^d cells at a node, and v̂ = v²/(G B_c K_II⁻¹ B_cᵀ) over the median of v̂/v in full
+/// cells. In full cells both parts of S₀ add up to v/2G for waves along an axis, and both vanish for a checkerboard, as B Bᵀ does. S_m has the
+/// masses M_I of the nodes, and is absent without inertia.
 #[derive(Debug)]
-struct Schur<const D: usize> {
-    cells: PressureCells,
+pub(super) struct Schur<const D: usize> {
+    pub(super) cells: PressureCells,
     /// The entries b_I: the cell and the node.
     pulls: Vec<(u32, u32, Vector<f64, D>)>,
     /// The entries m_I: the cell and the corner.
@@ -189,8 +90,8 @@ impl<const D: usize> LinearOperator for Sum<'_, D> {
 }
 
 impl<const D: usize> Schur<D> {
-    fn new(cells: PressureCells) -> Self {
-        let pulls = pulls(&cells);
+    pub(super) fn new(cells: PressureCells) -> Self {
+        let pulls = cells.pulls();
         let across = cells.occupied.grid.iter().copied().max().unwrap_or(1) as usize;
         let (count, degree) = (cells.volume.len(), across.clamp(LEAST, MOST));
         let mut schur = Self {
@@ -207,7 +108,7 @@ impl<const D: usize> Schur<D> {
         let share = 0.5 * D as f64 / f64::from(1 << D);
         let mut stiff = schur.coupled(&schur.stiffness_of_nodes(), share);
         let at = |c: usize| (schur.cells.volume[c], schur.cells.shear[c], schur.cells.augmented[c]);
-        let effective = effective_volumes(&schur.cells);
+        let effective = schur.cells.effective_volumes();
         for (c, effective) in effective.iter().enumerate() {
             let ((v, shear, gamma), compliance) = (at(c), 1.0 / schur.stiffness(c));
             schur.compliance[c] = compliance / (1.0 - gamma * compliance);
@@ -221,7 +122,7 @@ impl<const D: usize> Schur<D> {
     }
 
     /// k, at least a little more than γ.
-    fn stiffness(&self, cell: usize) -> f64 {
+    pub(super) fn stiffness(&self, cell: usize) -> f64 {
         self.cells.stiffness[cell].max(1.001 * self.cells.augmented[cell])
     }
 
@@ -242,8 +143,7 @@ impl<const D: usize> Schur<D> {
         let mut masses: Vec<f64> = blocks.iter().map(|block| block[(0, 0)]).collect();
         let numbers: HashMap<[u32; 3], usize> = occupied.nodes.iter().copied().zip(0..).collect();
         for (index, mass) in occupied.cells.iter().zip(&occupied.masses) {
-            let corners = (0..1_u32 << D).map(|corner| std::array::from_fn(|k| index[k] + (corner >> k & 1)));
-            for node in corners.filter_map(|corner| numbers.get(&corner)) {
+            for node in nodes_of::<D>(*index).filter_map(|corner| numbers.get(&corner)) {
                 masses[*node] += mass / f64::from(1 << D);
             }
         }
@@ -279,8 +179,7 @@ impl<const D: usize> Schur<D> {
         for (cell, index) in self.cells.index.iter().enumerate() {
             let (v, shear) = (self.cells.volume[cell], self.cells.shear[cell]);
             let m = v / (f64::from(2 << D) * shear * effective[cell]);
-            for corner in 0..1_u32 << D {
-                let at: [u32; 3] = std::array::from_fn(|k| index[k] + (corner >> k & 1));
+            for at in nodes_of::<D>(*index) {
                 let count = numbers.len() as u32;
                 let number = *numbers.entry(at).or_insert(count);
                 if number == count {
@@ -297,7 +196,7 @@ impl<const D: usize> Schur<D> {
     }
 
     /// q = S⁻¹ v
-    fn solve(&self, v: &[f64], q: &mut [f64]) {
+    pub(super) fn solve(&self, v: &[f64], q: &mut [f64]) {
         let inverted = |part: &Coupled<D>| {
             let mut q = vec![0.0; v.len()];
             smooth(self.polynomial, &Sum(self, part), &|r, z| part.scale(r, z), part.largest, v, &mut q, true);
@@ -310,82 +209,6 @@ impl<const D: usize> Schur<D> {
             q.iter_mut().zip(inverted(inert)).for_each(|(q, inert)| *q += inert);
         }
     }
-}
-
-/// v̂ of every cell: v²/(G B_c K_II⁻¹ B_cᵀ), divided by the median of its ratio to v in full cells.
-fn effective_volumes(cells: &PressureCells) -> Vec<f64> {
-    let occupied = &cells.occupied;
-    let full: HashSet<[u32; 3]> = occupied
-        .cells
-        .iter()
-        .zip(&occupied.filled)
-        .filter(|(_, filled)| **filled > FULL)
-        .map(|(cell, _)| *cell)
-        .collect();
-    let raw = |c: usize| cells.volume[c].powi(2) / (cells.shear[c] * cells.softness[c]);
-    let median = |chosen: &dyn Fn(usize) -> bool| {
-        let mut all: Vec<f64> = (0..cells.volume.len())
-            .filter(|&c| chosen(c))
-            .map(|c| raw(c) / cells.volume[c])
-            .filter(|x| x.is_finite() && *x > 0.0)
-            .collect();
-        all.sort_unstable_by(f64::total_cmp);
-        all.get(all.len() / 2).copied()
-    };
-    let unit = median(&|c| full.contains(&cells.index[c])).or_else(|| median(&|_| true)).unwrap_or(1.0);
-    let largest = cells.volume.iter().copied().fold(0.0, f64::max);
-    // Softness is not positive where A + Bᵀ γ B is indefinite.
-    let effective = |c: usize| if raw(c) >= 0.0 { (raw(c) / unit).min(STIFFEST * largest) } else { cells.volume[c] };
-    (0..cells.volume.len()).map(effective).collect()
-}
-
-/// The volume change of each cell under a motion of each hat function, by cell and node. Outer nodes follow inner ones.
-fn pulls<const D: usize>(cells: &PressureCells) -> Vec<(u32, u32, Vector<f64, D>)> {
-    let occupied = &cells.occupied;
-    let numbers: HashMap<[u32; 3], u32> = (0..).zip(&occupied.nodes).map(|(number, &index)| (index, number)).collect();
-    let mut followers = Followers::<D>::default();
-    if occupied.aggregated {
-        let shares = occupied.cells.iter().copied().zip(occupied.filled.iter().copied()).collect();
-        let of = Occupied { dimension: D, grid: occupied.grid, nodes: &occupied.nodes, cells: shares };
-        let held = occupied.prescribed.iter().enumerate().filter(|(_, held)| **held).map(|(k, _)| (k / D, k % D));
-        followers = Followers::new(Extension::new(Pieces::LINEAR, &of).into(), held);
-    }
-    let mut all: Vec<(u32, u32, Vector<f64, D>)> = Vec::new();
-    for (cell, (index, centroid)) in cells.index.iter().zip(&cells.centroid).enumerate() {
-        let pull = Tensor::<f64, D>::from_column_slice(&cells.pull[cell * D * D..(cell + 1) * D * D]);
-        let first = all.len();
-        let mut add = |node: u32, b: Vector<f64, D>| match all[first..].iter_mut().find(|entry| entry.1 == node) {
-            Some(entry) => entry.2 += b,
-            None => all.push((cell as u32, node, b)),
-        };
-        for (corner, slope) in slopes::<D>(index, centroid) {
-            let Some(&node) = numbers.get(&corner) else { continue };
-            let b = pull * slope;
-            let Some((follows, leaders)) = followers.row(node as usize) else {
-                add(node, b);
-                continue;
-            };
-            let part = |of: bool| Vector::from_fn(|i, _| if follows[i] == of { b[i] } else { 0.0 });
-            add(node, part(false));
-            leaders.for_each(|(leader, weight)| add(leader as u32, part(true) * weight));
-        }
-    }
-    all
-}
-
-/// The corners of a cell, and the gradients of their hat functions at a place in the cell.
-fn slopes<const D: usize>(index: &[u32; 3], place: &[f64; 3]) -> impl Iterator<Item = ([u32; 3], Vector<f64, D>)> {
-    let local: [f64; D] = std::array::from_fn(|k| (place[k] - f64::from(index[k])).clamp(0.0, 1.0));
-    let index = *index;
-    (0..1_u32 << D).map(move |corner| {
-        let upper = |k: usize| corner >> k & 1 == 1;
-        let hat = |k: usize| if upper(k) { local[k] } else { 1.0 - local[k] };
-        let slope = |k: usize| {
-            let others: f64 = (0..D).filter(|&other| other != k).map(hat).product();
-            if upper(k) { others } else { -others }
-        };
-        (std::array::from_fn(|k| index[k] + (corner >> k & 1)), Vector::from_fn(|k, _| slope(k)))
-    })
 }
 
 #[cfg(test)]
