@@ -2,7 +2,7 @@
 
 use super::container::Arrays;
 use crate::clock::Reached;
-use crate::mechanics::loads::{Loads, Reaction};
+use crate::mechanics::loads::{Loads, Obstacle, Obstacles, Reaction};
 use crate::mechanics::path::Path;
 use crate::mechanics::reference::LastEquilibrium;
 use crate::mechanics::transfer::Nodal;
@@ -66,6 +66,7 @@ pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) 
         ("external_work", std::slice::from_ref(external_work).into()),
         ("dissipated", std::slice::from_ref(dissipated).into()),
         ("path", vec![*load, *increment, *speed, *weight].into()),
+        ("obstacles", obstacle_state(&loads.obstacles).into()),
     ];
     if let Some(Configuration { position, displacement_gradient, dilatation }) = reference {
         arrays.extend([
@@ -92,6 +93,26 @@ pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) 
         ]);
     }
     arrays
+}
+
+/// Work, friction loss and anchors of every obstacle.
+fn obstacle_state<const D: usize>(obstacles: &Obstacles<D>) -> Vec<f64> {
+    let of = |one: &Obstacle<D>| {
+        [one.work, one.friction_loss].into_iter().chain(one.anchors.iter().flatten().copied()).collect::<Vec<_>>()
+    };
+    obstacles.list.iter().flat_map(of).collect()
+}
+
+/// Sets work, friction loss and anchors of every obstacle. The length of `numbers` fits.
+fn set_obstacle_state<const D: usize>(obstacles: &mut Obstacles<D>, mut numbers: &[f64]) {
+    for one in &mut obstacles.list {
+        let [work, friction_loss, rest @ ..] = numbers else { return };
+        (one.work, one.friction_loss) = (*work, *friction_loss);
+        let anchors: &mut [f64] = bytemuck::cast_slice_mut(&mut one.anchors);
+        let (own, others) = rest.split_at(anchors.len().min(rest.len()));
+        anchors.copy_from_slice(own);
+        numbers = others;
+    }
 }
 
 fn numbers<T: Pod>(values: &[T]) -> Cow<'_, [f64]> {
@@ -206,8 +227,12 @@ pub(super) fn restore<const D: usize, L, A>(
         return Err("a reference configuration without nodal fields, or the reverse".into());
     }
     let clock = simulation.clock.at(reached).ok_or("a time that the clock cannot show")?;
-    let equilibrium = equilibrium(arrays, count, &simulation.loads)?;
+    let mut loads = simulation.loads.clone();
+    set_obstacle_state(&mut loads.obstacles, &arrays["obstacles"]);
+    mutant!("checkpoint: the anchors of friction are forgotten": loads = simulation.loads.clone());
+    let equilibrium = equilibrium(arrays, count, &loads)?;
     simulation.clock = clock;
+    simulation.loads = loads;
     simulation.forget();
     simulation.history.equilibrium = equilibrium;
     // Particle data without an array is rearranged, too.

@@ -3,6 +3,7 @@
 mod affine;
 pub mod check;
 pub mod constitutive;
+pub(crate) mod contact;
 pub(crate) mod dilatation;
 pub mod loads;
 mod local_form;

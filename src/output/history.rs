@@ -1,4 +1,4 @@
-//! The rows of every step in `history.csv`, with energies, momentum and iterations, and in `reactions.csv`.
+//! The rows of every step in `history.csv`, with energies, momentum and iterations, in `reactions.csv` and in `obstacles.csv`.
 
 use super::Reference;
 use super::csv::{Row, cell};
@@ -6,7 +6,7 @@ use super::fields::padded;
 use crate::approximation::ShapeFunction;
 use crate::material::{DISSIPATED, Law, PLASTIC_STRAIN};
 use crate::mechanics::loads::{Loads, Reaction};
-use crate::simulation::Simulation;
+use crate::simulation::{ObstacleContact, Simulation};
 
 /// Axis names at the ends of column names.
 pub(crate) const AXES: [&str; 3] = ["x", "y", "z"];
@@ -18,14 +18,18 @@ pub struct Energies {
     pub kinetic: f64,
     /// Σ V₀ W
     pub strain: f64,
-    /// Work of gravity, tractions, pressure and moving walls since the start.
+    /// Work of gravity, tractions, pressure, moving walls and moving obstacles since the start.
     pub external: f64,
-    /// Kinetic and strain energy.
+    /// The energy stored in the contact with obstacles.
+    pub contact: f64,
+    /// Kinetic, strain and contact energy.
     pub total: f64,
-    /// Energy dissipated since the start by damping, plastic flow and relaxation.
+    /// Energy dissipated since the start by damping, friction, plastic flow and relaxation.
     pub dissipated: f64,
     /// The part of `dissipated` due to plastic flow and relaxation.
     pub by_laws: f64,
+    /// The part of `dissipated` due to friction at obstacles.
+    pub friction: f64,
     /// total₀ + dissipated₀ − external₀ when the reference was taken, see [`Reference::energy`].
     pub initial: f64,
     /// total + dissipated − initial − external: energy that the time integration and the transfers have gained (> 0) or lost.
@@ -59,9 +63,11 @@ impl Energies {
         let (kinetic, strain) = (simulation.particles.kinetic_energy(), simulation.strain_energy());
         let by_laws = simulation.dissipated_by_laws();
         let dissipated = simulation.dissipated + by_laws;
-        let (external, total, initial) = (simulation.external_work, kinetic + strain, reference.energy);
+        let friction = simulation.loads.obstacles.list.iter().fold(0.0, |sum, obstacle| sum + obstacle.friction_loss);
+        let contact = simulation.contact_energy();
+        let (external, total, initial) = (simulation.external_work, kinetic + strain + contact, reference.energy);
         let balance = total + dissipated - initial - external;
-        Self { kinetic, strain, external, dissipated, by_laws, initial, total, balance }
+        Self { kinetic, strain, external, contact, dissipated, by_laws, friction, initial, total, balance }
     }
 }
 
@@ -81,9 +87,11 @@ pub(crate) struct Cost {
 /// The row of the present state in `history.csv`. Columns without meaning in a run are left out. In load steps, loads act at once, and an
 /// energy balance says nothing of their work.
 pub(crate) fn row<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, energies: &Energies, cost: Cost) -> Row {
-    let Energies { kinetic, strain, external, dissipated, total, balance, .. } = *energies;
+    let Energies { kinetic, strain, external, contact, dissipated, friction, total, balance, .. } = *energies;
     let scheme = &simulation.settings.scheme;
-    let dissipates = simulation.loads.damping.is_some() || simulation.has_internal_variable(DISSIPATED);
+    let obstacles = &simulation.loads.obstacles;
+    let dissipates =
+        simulation.loads.damping.is_some() || obstacles.have_friction() || simulation.has_internal_variable(DISSIPATED);
     let momentum = padded(&simulation.particles.momentum());
     let columns = [
         (true, "step", cell(simulation.clock.steps())),
@@ -93,7 +101,9 @@ pub(crate) fn row<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, e
         (true, "kinetic", cell(kinetic)),
         (true, "strain", cell(strain)),
         (true, "external", cell(external)),
+        (!obstacles.list.is_empty(), "contact", cell(contact)),
         (dissipates, "dissipated", cell(dissipated)),
+        (obstacles.have_friction(), "friction", cell(friction)),
         (true, "total", cell(total)),
         (scheme.has_inertia(), "balance", cell(balance)),
         (true, "momentum_x", cell(momentum[0])),
@@ -114,6 +124,28 @@ pub(crate) fn reactions<const D: usize>(time: f64, loads: &Loads<D>, reactions: 
         let name = &condition.name;
         row.extend(AXES.iter().zip(&reaction.force).map(|(axis, force)| (format!("{name}_{axis}"), cell(force))));
         row.extend(condition.rotation().map(|_| (format!("{name}_torque"), cell(reaction.torque))));
+    }
+    row
+}
+
+/// The row of a step that ended at `time` in `obstacles.csv`. Columns begin with the name of the obstacle: the force and the moment on the
+/// obstacle, the area of contact, the largest depth, and the work and the friction loss since the start.
+pub(crate) fn obstacles<const D: usize>(time: f64, loads: &Loads<D>, contacts: &[ObstacleContact<D>]) -> Row {
+    let mut row = vec![("time".to_owned(), cell(time))];
+    for (obstacle, contact) in loads.obstacles.list.iter().zip(contacts) {
+        let mut add = |what: &str, x: f64| row.push((format!("{}_{what}", obstacle.name), cell(x)));
+        AXES.iter().zip(&contact.force).for_each(|(axis, force)| add(axis, *force));
+        match D {
+            1 => {}
+            2 => add("moment", contact.moment[2]),
+            _ => AXES.iter().zip(contact.moment).for_each(|(axis, moment)| add(&format!("moment_{axis}"), moment)),
+        }
+        add("area", contact.area);
+        add("depth", contact.depth);
+        add("work", contact.work);
+        if obstacle.friction > 0.0 {
+            add("friction_loss", contact.friction_loss);
+        }
     }
     row
 }

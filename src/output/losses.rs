@@ -6,6 +6,8 @@ use serde::{Deserialize, Serialize};
 /// The event of a step that may lose energy. Of several events, the first in this list counts.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Cause {
+    /// A body touches an obstacle.
+    Obstacle,
     /// A body feels a wall that it has come to.
     Wall,
     /// Bodies share nodes.
@@ -17,13 +19,14 @@ pub(crate) enum Cause {
 }
 
 impl Cause {
-    const ALL: [Self; 4] = [Self::Wall, Self::Bodies, Self::NewGrid, Self::Step];
+    const ALL: [Self; 5] = [Self::Obstacle, Self::Wall, Self::Bodies, Self::NewGrid, Self::Step];
 
     /// The cause of losses in a step.
-    pub fn of(feels_wall: bool, shares: bool, renewed: bool) -> Self {
-        match (feels_wall, shares, renewed) {
-            (true, ..) => Self::Wall,
-            (_, true, _) => Self::Bodies,
+    pub fn of(touches_obstacle: bool, feels_wall: bool, shares: bool, renewed: bool) -> Self {
+        match (touches_obstacle, feels_wall, shares, renewed) {
+            (true, ..) => Self::Obstacle,
+            (_, true, ..) => Self::Wall,
+            (.., true, _) => Self::Bodies,
             (.., true) => Self::NewGrid,
             _ => Self::Step,
         }
@@ -32,6 +35,7 @@ impl Cause {
     /// Steps of this kind, in words.
     fn steps(self) -> &'static str {
         match self {
+            Self::Obstacle => "steps in which a body touches an obstacle",
             Self::Wall => "steps in which a body meets a wall (impact)",
             Self::Bodies => "steps in which bodies share nodes (impact, or sticking)",
             Self::NewGrid => "other steps with a new grid",
@@ -49,6 +53,10 @@ impl Cause {
             (Self::Wall | Self::Bodies, false) => {
                 "shorten time.step, with which the loss falls; time.lumping = 1 keeps more energy where bodies meet at more than about a \
                  tenth of their speed of sound"
+            }
+            (Self::Obstacle, false) => "shorten time.step, with which the loss falls",
+            (Self::Obstacle, true) => {
+                "time.lumping = 0.1 with \"grid\": {\"reset\": {\"strain\": 0.1}} keeps most energy; then shorten time.step"
             }
             (Self::NewGrid, _) => {
                 "keep the grid where bodies are free: \"grid\": {\"reset\": {\"strain\": 0.1}}, or \"never\""

@@ -4,6 +4,7 @@ use super::OutputError;
 use super::counts::{Counts, Seconds};
 use super::files::Written;
 use super::snapshots::SnapshotMark;
+use super::touched::Touched;
 use super::warnings::Watch;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -48,6 +49,7 @@ pub struct Mark {
     pub(super) files: BTreeMap<String, Written>,
     pub(super) snapshots: Option<SnapshotMark>,
     pub(super) watch: Watch,
+    pub(super) touched: Vec<Touched>,
     pub(super) counts: Counts,
     pub(super) seconds: Seconds,
 }

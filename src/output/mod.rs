@@ -6,6 +6,7 @@
 //! |---|---|
 //! | `history.csv` | energies, momentum, Newton and Krylov iterations of every step |
 //! | `reactions.csv` | force of every prescribed condition on the bodies, torque of rotations, if there are any |
+//! | `obstacles.csv` | force, moment, area and depth of contact, work and friction loss of every obstacle, if there are any |
 //! | `probes.csv` | fields at chosen particles or points, if any are asked for |
 //! | `particles.pvd`, `particles_*.vtu` | snapshots of the particles for ParaView |
 //! | `newton.jsonl` | Newton's method, one line per step; moved into `report.json` at the end, but also kept if there are checkpoints |
@@ -34,6 +35,7 @@ mod reference;
 pub mod report;
 pub(crate) mod snapshots;
 mod summary;
+pub mod touched;
 pub mod vtu;
 pub mod warnings;
 

@@ -11,13 +11,14 @@ use super::probes::{self, Probe};
 use super::progress::{Audience, Progress};
 use super::report::{self, Counts, Outcome, Seconds};
 use super::snapshots::Snapshots;
+use super::touched;
 use super::warnings::Watched;
 use super::{OutputError, Reference, Summary};
 use crate::approximation::ShapeFunction;
 use crate::field::Field;
 use crate::material::Law;
 use crate::mechanics::loads::Reaction;
-use crate::simulation::{Simulation, StepReport};
+use crate::simulation::{ObstacleContact, Simulation, StepReport};
 use serde_json::{Map, Value};
 use std::path::PathBuf;
 use std::time::Instant;
@@ -61,6 +62,7 @@ pub struct Recorder<const D: usize> {
     reference: Reference<D>,
     history: Table,
     reactions: Option<Table>,
+    obstacles: Option<Table>,
     probes: Vec<Probe<D>>,
     probed: Option<Table>,
     snapshots: Option<Snapshots>,
@@ -132,6 +134,10 @@ impl<const D: usize> Recorder<D> {
         let reactions = (!loads.prescribed.is_empty())
             .then(|| table("reactions.csv", &history::reactions(0.0, loads, &no_reactions)))
             .transpose()?;
+        let untouched = vec![ObstacleContact::NONE; loads.obstacles.list.len()];
+        let obstacles = (!untouched.is_empty())
+            .then(|| table("obstacles.csv", &history::obstacles(0.0, loads, &untouched)))
+            .transpose()?;
         let probed = (!probes.is_empty())
             .then(|| table("probes.csv", &probes::row(&probes, simulation, &reference)?))
             .transpose()?;
@@ -141,6 +147,7 @@ impl<const D: usize> Recorder<D> {
         Ok(Self {
             history,
             reactions,
+            obstacles,
             probes,
             probed,
             snapshots,
@@ -196,6 +203,9 @@ impl<const D: usize> Recorder<D> {
         if let Some(reactions) = &mut self.reactions {
             reactions.write(&history::reactions(time, &simulation.loads, &step.reactions))?;
         }
+        if let Some(obstacles) = &mut self.obstacles {
+            obstacles.write(&history::obstacles(time, &simulation.loads, &step.obstacles))?;
+        }
         let newton = &step.newton.history;
         let (iterations, krylov) = (newton.iterations.len(), newton.counts.krylov_iterations);
         let cost = Cost { dt: step.dt, newton: iterations, krylov, yielding: step.yielding };
@@ -206,15 +216,19 @@ impl<const D: usize> Recorder<D> {
             step: number,
             settings,
             energies,
-            cause: Cause::of(step.feels_wall, !step.sharing.is_empty(), step.reset),
+            cause: Cause::of(step.touches_obstacle(), step.feels_wall, !step.sharing.is_empty(), step.reset),
             cost,
             failed: step.failed.iter().filter(|attempt| !attempt.inaccurate).count(),
             error: step.error,
             limited: attempts().map(|one| one.counts.krylov_limited).sum(),
             stagnated: attempts().map(|one| one.counts.krylov_stagnated).sum(),
         };
+        touched::see(&mut self.so_far.touched, time, &simulation.loads.obstacles, &step.obstacles);
         let known = self.so_far.watch.warnings.len();
         self.so_far.watch.see(&seen);
+        for (obstacle, contact) in simulation.loads.obstacles.list.iter().zip(&step.obstacles) {
+            self.so_far.watch.see_depth(&seen, &obstacle.name, contact.depth / simulation.grid.spacing);
+        }
         let names: Vec<&str> = simulation.bodies.iter().map(|body| body.name.as_str()).collect();
         self.so_far.watch.see_contact(&seen, &step.sharing, &names);
         if settings.scheme.follows_path() {
@@ -258,6 +272,7 @@ impl<const D: usize> Recorder<D> {
             krylov: simulation.krylov().0,
             seconds: self.seconds_so_far(),
             contact: self.so_far.watch.contacts,
+            obstacles: self.so_far.touched,
             warnings: self.so_far.watch.warnings,
             counts: self.so_far.counts,
         };
@@ -294,7 +309,7 @@ impl<const D: usize> Recorder<D> {
 
     /// All files that grow line by line.
     fn streams(&mut self) -> impl Iterator<Item = &mut Stream> {
-        let tables = [Some(&mut self.history), self.reactions.as_mut(), self.probed.as_mut()];
+        let tables = [Some(&mut self.history), self.reactions.as_mut(), self.obstacles.as_mut(), self.probed.as_mut()];
         std::iter::once(&mut self.newton).chain(tables.into_iter().flatten().map(|table| &mut table.0))
     }
 }

@@ -11,7 +11,7 @@ use crate::tensor::Vector;
 pub struct Reference<const D: usize> {
     /// Position of every particle by its id; displacements are measured from here.
     pub position: Vec<Vector<f64, D>>,
-    /// Kinetic, strain and dissipated energy, less the external work done so far.
+    /// Kinetic, strain, contact and dissipated energy, less the external work done so far.
     pub energy: f64,
     /// Σ m v
     pub momentum: Vector<f64, D>,
@@ -35,6 +35,7 @@ impl<const D: usize> Reference<D> {
             position: particles.places().iter().map(|&p| particles.position[p as usize]).collect(),
             energy: particles.kinetic_energy()
                 + simulation.strain_energy()
+                + simulation.contact_energy()
                 + simulation.dissipated
                 + simulation.dissipated_by_laws()
                 - simulation.external_work,

@@ -133,7 +133,8 @@ pub(crate) fn write(
 }
 
 fn head(asked: &Map<String, Value>, outcome: Outcome<'_>, summary: &Summary) -> Value {
-    let Energies { kinetic, strain, external, dissipated, by_laws, initial, total, balance } = summary.energies;
+    let Energies { kinetic, strain, external, contact, dissipated, by_laws, friction, initial, total, balance } =
+        summary.energies;
     let seconds = summary.seconds.named().chain([("total", summary.seconds.total)]);
     let seconds: Map<_, _> = seconds.map(|(name, x)| (name.to_owned(), json!(Number(x)))).collect();
     let (word, message) = outcome.words(summary.time);
@@ -142,10 +143,12 @@ fn head(asked: &Map<String, Value>, outcome: Outcome<'_>, summary: &Summary) -> 
         "time": Number(summary.time), "mass": Number(summary.mass),
         "energies": {
             "kinetic": Number(kinetic), "strain": Number(strain), "external": Number(external),
-            "dissipated": Number(dissipated), "dissipated_by_laws": Number(by_laws), "initial": Number(initial),
+            "contact": Number(contact), "dissipated": Number(dissipated), "dissipated_by_laws": Number(by_laws),
+            "dissipated_by_friction": Number(friction), "initial": Number(initial),
             "total": Number(total), "balance": Number(balance),
         },
         "counts": summary.counts, "seconds": seconds, "warnings": summary.warnings, "contact": summary.contact,
+        "obstacles": summary.obstacles,
     });
     if let Outcome::Failed(error) = outcome {
         head["failed_attempts"] = json!(Attempt::failed(&error.failed));

@@ -3,6 +3,7 @@
 use super::contact::Contact;
 use super::counts::{Counts, Seconds};
 use super::history::Energies;
+use super::touched::Touched;
 use super::warnings::Warning;
 use crate::solver::Krylov;
 use std::fmt::{Display, Formatter, Result};
@@ -27,6 +28,8 @@ pub struct Summary {
     pub krylov: Krylov,
     /// Bodies that shared nodes.
     pub contact: Vec<Contact>,
+    /// Obstacles that bodies touched.
+    pub obstacles: Vec<Touched>,
     /// The warnings that were given.
     pub warnings: Vec<Warning>,
     /// Counts over all steps.
@@ -44,14 +47,17 @@ impl Display for Summary {
             "{} steps to t = {time} in {:.1} s: {} particles, up to {} active nodes, {} failed attempts",
             counts.steps, seconds.total, counts.particles, counts.max_active_nodes, counts.failed_attempts
         )?;
-        let Energies { kinetic, strain, total, external, dissipated, by_laws, initial, balance } = energies;
+        let Energies { kinetic, strain, contact, total, external, dissipated, by_laws, friction, initial, balance } =
+            energies;
         let size = balance.abs();
+        let by_friction = if *friction != 0.0 { format!(", by friction {friction:.6e}") } else { String::new() };
         let terms = format!(
-            "initial {initial:.6e} + external work {external:.6e} - dissipated {dissipated:.6e} (by laws {by_laws:.6e})"
+            "initial {initial:.6e} + external work {external:.6e} - dissipated {dissipated:.6e} (by laws {by_laws:.6e}{by_friction})"
         );
         if self.has_inertia {
             let error = if *balance > 0.0 { "+ created" } else { "- lost" };
-            writeln!(f, "energy    kinetic {kinetic:.6e}, strain {strain:.6e}, total {total:.6e}")?;
+            let in_contact = if *contact > 0.0 { format!(", contact {contact:.6e}") } else { String::new() };
+            writeln!(f, "energy    kinetic {kinetic:.6e}, strain {strain:.6e}{in_contact}, total {total:.6e}")?;
             writeln!(f, "balance   total {total:.6e} = {terms} {error} {size:.3e}")?;
             let [change, scale] = [self.momentum_change, self.momentum_scale];
             writeln!(f, "momentum  changed by {change:.3e}; sum of m |v| is {scale:.3e}")?;
@@ -68,6 +74,9 @@ impl Display for Summary {
         )?;
         for contact in &self.contact {
             writeln!(f, "contact   {contact}")?;
+        }
+        for touched in &self.obstacles {
+            writeln!(f, "obstacle  {touched}")?;
         }
         for Warning { time, step, message, .. } in &self.warnings {
             writeln!(f, "warned    t = {time}, step {step}: {message}")?;

@@ -14,10 +14,13 @@ const CREATED: f64 = 0.01;
 /// Lost energy, as a fraction of the largest total energy so far, above which there is a warning.
 const LOST: f64 = 0.02;
 
+/// The depth of a body in an obstacle, in grid spacings, above which there is a warning.
+const DEEP: f64 = 0.25;
+
 /// Steps over which the usual number of iterations is averaged.
 const MEMORY: u64 = 50;
 
-/// Steps before iterations are compared with their mean. A loss of energy is reported if it lasts for as many steps.
+/// Steps before iterations are compared with their mean. A loss or a gain of energy is reported if it lasts for as many steps.
 const USUAL_AFTER: u64 = 10;
 
 /// The multiple of their usual number beyond which Krylov iterations get a warning.
@@ -46,6 +49,8 @@ pub enum Kind {
     KrylovLimited,
     /// Linear systems are left unsolved because their residual no longer falls.
     KrylovStagnated,
+    /// A body is deep in an obstacle.
+    ObstacleDeep,
     /// Two bodies share nodes and are pulled apart.
     BodiesStick,
     /// The load on the equilibrium path has turned at a limit point.
@@ -77,6 +82,8 @@ pub(crate) struct Watch {
     losses: Losses,
     /// Consecutive steps after which the loss was too large.
     losing: u64,
+    /// Consecutive steps after which the gain was too large.
+    creating: u64,
     /// Bodies that shared nodes.
     pub(crate) contacts: Vec<Contact>,
     path: Followed,
@@ -125,15 +132,18 @@ impl Watch {
         // In load steps, loads act at once and lose work.
         let has_inertia = step.settings.scheme.has_inertia();
         let (created, balance) = (-self.losses.part(), step.energies.balance);
-        if has_inertia && created > CREATED {
+        self.creating = if has_inertia && created > CREATED { self.creating + 1 } else { 0 };
+        // In the first steps of contact from rest there is next to no energy.
+        let at_obstacle = matches!(step.cause, Cause::Obstacle);
+        if self.creating >= if at_obstacle { USUAL_AFTER } else { 1 } {
             let part = 100.0 * created;
             let text = format!(
                 "energy was created: the balance is {balance:+.3e}, {part:.1} % of the largest total energy so far"
             );
             self.warn(step, Kind::EnergyCreated, text);
         }
-        self.losing = if has_inertia && -created > LOST { self.losing + 1 } else { 0 };
         // In the first steps from rest there is next to no energy.
+        self.losing = if has_inertia && -created > LOST { self.losing + 1 } else { 0 };
         if self.losing >= USUAL_AFTER {
             self.warn(step, Kind::EnergyLost, self.losses.says(self.lumped));
         }
@@ -192,6 +202,17 @@ impl Watch {
         }
         self.seen += 1;
         self.usual_krylov += (krylov - usual) / self.seen.min(MEMORY) as f64;
+    }
+
+    /// Warns of a body that is deep in an obstacle. `depth` is in grid spacings.
+    pub(crate) fn see_depth(&mut self, step: &Watched, obstacle: &str, depth: f64) {
+        if depth > DEEP {
+            let text = format!(
+                "a body is {depth:.2} grid spacings deep in the obstacle {obstacle:?}, and the contact is too soft for its shape: raise \
+                 obstacles[].stiffness, or lower grid.spacing"
+            );
+            self.warn(step, Kind::ObstacleDeep, text);
+        }
     }
 
     /// Examines the bodies that share nodes after a step. Warns of each pair of bodies that sticks together from now on.
@@ -270,8 +291,10 @@ mod tests {
             kinetic: 2.0,
             strain: 2.0,
             external: -9.0,
+            contact: 0.0,
             dissipated: 0.0,
             by_laws: 0.0,
+            friction: 0.0,
             initial: 4.0,
             total: 4.0,
             balance: -0.07,

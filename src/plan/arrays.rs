@@ -98,7 +98,9 @@ impl<const D: usize, L: Law, A: ShapeFunction> Inventory<'_, D, L, A> {
         let asks = loads.field.is_some() && !self.has_inertia;
         let carries_over = !self.has_inertia && self.simulation.may_reset();
         let out_of_balance = nodes * Self::VECTOR * if self.keeps_grid { 3 } else { 2 };
-        let points: usize = loads.surface.iter().map(|load| load.points.len()).sum();
+        let loaded: usize = loads.surface.iter().map(|load| load.points.len()).sum();
+        let points = loaded + loads.obstacles.points.len();
+        let anchors: usize = loads.obstacles.list.iter().map(|obstacle| obstacle.anchors.len()).sum();
         // In load steps, the points of the last equilibrium are stored, too.
         let copies = if self.has_inertia { 1 } else { 2 };
         vec![
@@ -113,7 +115,12 @@ impl<const D: usize, L: Law, A: ShapeFunction> Inventory<'_, D, L, A> {
             (asks, "particles: x for a field of forces", particles * Self::VECTOR),
             // The out-of-balance force, as computed and with prescribed values in place; a copy with a kept grid. None on the first grid.
             (carries_over, "nodal fields: out-of-balance force", out_of_balance),
-            (points > 0, "loaded surfaces", points * copies * size_of::<SurfacePoint<D>>()),
+            (
+                points > 0,
+                "loaded surfaces, and surfaces that may touch obstacles",
+                points * copies * size_of::<SurfacePoint<D>>(),
+            ),
+            (anchors > 0, "anchors of friction", anchors * 2 * copies * Self::VECTOR),
         ]
     }
 

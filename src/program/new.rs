@@ -20,9 +20,9 @@ macro_rules! problems {
 }
 
 /// Name and scene of every problem.
-const PROBLEMS: [(&str, &str); 15] = problems! {
+const PROBLEMS: [(&str, &str); 19] = problems! {
     rebound collision cantilever compaction riemann_jump ball_drop column_static elastica cook ring tube cook_plastic taylor slope
-    collapse
+    collapse bounce rolling punch wedge
 };
 
 /// File name of the schema beside the scene.

@@ -94,7 +94,18 @@ impl Face {
         }
     }
 
-    fn check(&self, problems: &mut Problems, path: &str, dimension: usize) {
+    /// The given motions, with their keys.
+    pub(super) fn motions(
+        [displacement, velocity]: [&Option<Table>; 2],
+        rotation: &Option<Rotation>,
+    ) -> Vec<(&'static str, Self)> {
+        let displacement = displacement.clone().map(|table| ("displacement", Self::Displacement(table)));
+        let velocity = velocity.clone().map(|table| ("velocity", Self::Velocity(table)));
+        let rotation = rotation.clone().map(|rotation| ("rotation", Self::Rotation(rotation)));
+        [displacement, velocity, rotation].into_iter().flatten().collect()
+    }
+
+    pub(super) fn check(&self, problems: &mut Problems, path: &str, dimension: usize) {
         match self {
             Self::Free | Self::Sliding | Self::Fixed => {}
             Self::Held(held) => drop(problems.length(&format!("{path}.held"), held.len(), dimension)),
@@ -162,10 +173,7 @@ impl Prescribed {
 
     /// All given motions, with their keys; a checked scene has exactly one.
     pub(super) fn given(&self) -> Vec<(&'static str, Face)> {
-        let displacement = self.displacement.clone().map(|table| ("displacement", Face::Displacement(table)));
-        let velocity = self.velocity.clone().map(|table| ("velocity", Face::Velocity(table)));
-        let rotation = self.rotation.clone().map(|rotation| ("rotation", Face::Rotation(rotation)));
-        [displacement, velocity, rotation].into_iter().flatten().collect()
+        Face::motions([&self.displacement, &self.velocity], &self.rotation)
     }
 }
 

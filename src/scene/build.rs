@@ -73,8 +73,10 @@ impl Scene {
             let (name, density, dilatation) = (body.name.clone(), body.density, body.volumetric);
             bodies.push(particles::Body { name, law, density, dilatation });
         }
-        let loads = builder.loads()?;
+        let mut loads = builder.loads()?;
+        builder.refuse_overlap(&loads.obstacles)?;
         let mut particles = builder.particles;
+        loads.obstacles.anchor(&particles.position, 0.0);
         particles.set_internal_to_rest(&bodies);
         let clock = Clock::new(self.time.step, self.time.max_halvings);
         let mut simulation = Simulation {
@@ -106,7 +108,9 @@ impl Scene {
         let loads = loads.filter_map(|(path, load)| Some((format!("{path}.region"), load.region.as_ref()?)));
         let initial = self.initial_velocity.iter().flat_map(|initial| &initial.nodes).enumerate();
         let initial = initial.map(|(i, one)| (format!("initial_velocity.nodes[{i}].region"), &one.region));
-        bodies.chain(prescribed).chain(loads).chain(initial).collect()
+        let obstacles = self.obstacles.iter().enumerate();
+        let obstacles = obstacles.map(|(i, one)| (format!("obstacles[{i}].shape"), &one.shape));
+        bodies.chain(prescribed).chain(loads).chain(obstacles).chain(initial).collect()
     }
 
     fn settings(&self) -> Settings {
@@ -115,7 +119,7 @@ impl Scene {
         let by_itself = if self.time.scheme().has_inertia() { Forcing::default() } else { Forcing::EisenstatWalker };
         Settings {
             scheme: self.time.scheme().scheme(self.time.newmark()),
-            lumping: self.time.lumping(),
+            lumping: self.lumping(),
             projection: self.time.projection.unwrap_or_default(),
             aggregation: self.aggregates(),
             grid_reset: self.grid_reset(),

@@ -204,7 +204,7 @@ impl Scene {
     /// bodies, and no lumped mass, not even in part.
     pub(super) fn is_integrated(&self) -> bool {
         let gauss = |body: &Body| body.shape.is_some() && self.filling(body).layout == Layout::Gauss;
-        let lumped = self.time.scheme().has_inertia() && self.time.lumping() > 0.0;
+        let lumped = self.time.scheme().has_inertia() && self.lumping() > 0.0;
         !lumped && self.is_kept() && self.bodies.iter().all(gauss)
     }
 

@@ -1,17 +1,22 @@
 //! The loads of a scene: body forces, held faces and regions, loads on surfaces.
 
+use super::body::Body;
 use super::boundary::{Face, Table};
 use super::filling::Builder;
 use super::load::{Loaded, Pressure, Stress, Traction};
 use super::vector::vector;
 use super::{BuildError, Scene};
 use crate::mechanics::loads::{
-    Curve, CurveError, ForceField, Gravity, Loads, Motion, Prescribed, Pressing, Rotation, Selection, SurfaceLoad,
-    SurfacePoint,
+    Curve, CurveError, ForceField, Gravity, Loads, Motion, Obstacle, Obstacles, Prescribed, Pressing, Rotation,
+    Selection, SurfaceLoad, SurfacePoint,
 };
 use crate::shape;
 use crate::tensor::Vector;
 use std::sync::Arc;
+
+/// The largest depth of a body in an obstacle at the start, in grid spacings. Surface points of curved bodies lie on planes that leave the
+/// surface by less.
+const DEEPEST_START: f64 = 0.02;
 
 impl Scene {
     /// All loads on surfaces with their paths, tractions first.
@@ -67,7 +72,61 @@ impl<const D: usize> Builder<'_, D> {
             };
             loads.surface.push(SurfaceLoad { pressing, curve: factor(load.curve.as_ref())?, points });
         }
+        loads.obstacles = self.obstacles()?;
         Ok(loads)
+    }
+
+    /// The obstacles, and points on the whole surface of every body.
+    fn obstacles(&mut self) -> Result<Obstacles<D>, BuildError> {
+        let scene = self.scene;
+        let mut obstacles = Obstacles::default();
+        for (i, one) in scene.obstacles.iter().enumerate() {
+            let path = format!("obstacles[{i}]");
+            let (shape, motion) = (one.shape.built(&path)?, one.motion().motion(0)?);
+            obstacles.list.push(Obstacle::new(one.name.clone(), shape, motion, one.stiffness, one.friction));
+        }
+        for (i, body) in scene.bodies.iter().enumerate().filter(|_| !scene.obstacles.is_empty()) {
+            let whole =
+                Loaded { body: &body.name, region: &None, stress: Stress::Pressure(0.0), curve: &None, surface: &None };
+            obstacles.points.extend(self.points(&format!("bodies[{i}]"), &whole)?);
+        }
+        Ok(obstacles)
+    }
+
+    /// The body around the middle of a bounded obstacle, which may lie between particles.
+    fn around(&self, obstacle: &shape::Shape<D>) -> Option<&str> {
+        let (min, max) = obstacle.bounding_box();
+        let middle = Some((min + max) * 0.5).filter(|x| x.iter().all(|x| x.is_finite()))?;
+        let is_around = |body: &&Body| {
+            let shape = body.shape.as_ref().and_then(super::shape::Shape::build::<D>);
+            shape.is_some_and(|shape| shape.signed_distance(&middle) < 0.0)
+        };
+        let bodies = self.scene.bodies.iter().filter(|_| obstacle.signed_distance(&middle) <= 0.0);
+        bodies.filter(is_around).map(|body| body.name.as_str()).next()
+    }
+
+    /// Refuses bodies that start in an obstacle.
+    pub fn refuse_overlap(&self, obstacles: &Obstacles<D>) -> Result<(), BuildError> {
+        let (particles, h) = (&self.particles, self.grid.spacing);
+        for (i, obstacle) in obstacles.list.iter().enumerate() {
+            let depth = |p: usize| -obstacle.shape.signed_distance(&particles.position[p]);
+            let deepest = (0..particles.len()).max_by(|&a, &b| depth(a).total_cmp(&depth(b)));
+            if let Some(p) = deepest.filter(|&p| depth(p) > DEEPEST_START * h) {
+                let body = &self.scene.bodies[particles.body[p] as usize].name;
+                let (x, depth) = (particles.position[p].as_slice(), depth(p) / h);
+                let what = format!(
+                    "body {body:?} starts in the obstacle {:?}: its point at {x:?} is {depth:.3} grid spacings deep, and {DEEPEST_START} \
+                     is allowed; move one of the two",
+                    obstacle.name
+                );
+                return Err(BuildError::at(format!("obstacles[{i}]"), what));
+            }
+            if let Some(body) = self.around(&obstacle.shape) {
+                let what = format!("obstacle {:?} starts inside body {body:?}; move one of the two", obstacle.name);
+                return Err(BuildError::at(format!("obstacles[{i}]"), what));
+            }
+        }
+        Ok(())
     }
 
     /// The points of a loaded surface. With the key `surface`, these are particles of the body; otherwise, new points on the surface of the

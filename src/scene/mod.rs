@@ -12,6 +12,7 @@ pub mod grid;
 pub mod image_file;
 pub mod keys;
 pub mod load;
+pub mod obstacle;
 pub mod output;
 pub mod particle_file;
 pub mod shape;
@@ -62,6 +63,9 @@ const OF_INERTIA: [&str; 3] = ["transfer", "initial_velocity", "damping"];
 
 /// Keys of `time` that have a meaning only with inertia.
 const TIME_OF_INERTIA: [&str; 6] = ["beta", "gamma", "lumping", "projection", "wall_update", "adaptive"];
+
+/// The default of `time.lumping` where there are obstacles (`docs/src/obstacles.md`).
+const LUMPING_AT_OBSTACLES: f64 = 0.1;
 
 /// A body that comes this near to a face of the box, in spacings, touches it.
 const TOUCHES: f64 = 1e-9;
@@ -120,6 +124,9 @@ pub struct Scene {
     /// Pressures on surfaces.
     #[serde(default)]
     pub pressures: Vec<load::Pressure>,
+    /// Rigid obstacles that bodies touch and leave freely.
+    #[serde(default)]
+    pub obstacles: Vec<obstacle::Obstacle>,
     /// Initial velocities of nodes. Bodies and particle files must then give no velocities.
     pub initial_velocity: Option<InitialVelocity>,
     /// The solver of the equations of a step.
@@ -237,18 +244,25 @@ impl Scene {
         let has_inertia = self.time.scheme().has_inertia();
         let courant = || accuracy::courant(&self.bodies, self.grid.spacing, self.time.step).unwrap_or(0.0);
         let long_steps = self.time.adaptive.is_none() && (!has_inertia || courant() > LONG_STEPS);
-        let consistent = has_inertia && self.time.lumping() == 0.0;
-        let needed = long_steps || consistent || computed;
+        let consistent = has_inertia && self.lumping() == 0.0;
+        let needed = long_steps || consistent || computed || !self.obstacles.is_empty();
         self.aggregation.or(self.ghost_stiffness.map(|factor| factor > 0.0)).unwrap_or(needed)
     }
 
-    /// When the grid is reset. A clamped body vibrates, and seldom meets anything. Other bodies may come to walls, and a grid that is reset
-    /// in every step feels a wall from farther away.
+    /// ε, the lumped share of the mass. Bodies that roll on obstacles or leave them lose energy with a lumped mass, and a consistent one
+    /// makes the force of contact ring.
+    pub(super) fn lumping(&self) -> f64 {
+        let default = if self.obstacles.is_empty() { 1.0 } else { LUMPING_AT_OBSTACLES };
+        self.time.lumping.unwrap_or(default)
+    }
+
+    /// When the grid is reset. A clamped body vibrates, and seldom meets anything. Obstacles need no reset either. Other bodies may come to
+    /// walls, and a grid that is reset in every step feels a wall from farther away.
     fn grid_reset(&self) -> GridReset {
         let flip = self.transfer.is_none_or(|transfer| transfer == transfer::Transfer::Flip);
         self.grid.given_reset().unwrap_or(match self.time.scheme().has_inertia() {
             false => GridReset::Strain(STATIC_STRAIN),
-            true if flip && self.is_clamped() => GridReset::Strain(VIBRATION_STRAIN),
+            true if flip && (self.is_clamped() || !self.obstacles.is_empty()) => GridReset::Strain(VIBRATION_STRAIN),
             true => GridReset::EveryStep,
         })
     }
@@ -295,6 +309,8 @@ impl Scene {
     fn unsymmetric(&self) -> Option<&'static str> {
         let has_friction = self.laws().any(|law| !law.is_symmetric());
         let friction = has_friction.then_some("a law with friction makes");
+        let rubs = self.obstacles.iter().any(|obstacle| obstacle.friction > 0.0);
+        let friction = friction.or(rubs.then_some("obstacles with friction make"));
         if self.pressures.is_empty() { friction } else { Some("pressures make") }
     }
 
@@ -333,12 +349,18 @@ impl Scene {
             let moves = prescribed.given().iter().any(|(_, motion)| motion.moves());
             problems.require(!moves, &format!("prescribed[{i}]"), "a motion", allowed);
         }
+        for i in 0..self.obstacles.len() {
+            problems.refuse(&format!("obstacles[{i}]"), "an obstacle", allowed);
+        }
         let kept = self.grid.given_reset() != Some(GridReset::EveryStep);
         problems.require(kept, "grid.reset", "\"every_step\"", allowed);
     }
 
     /// Fills in defaults that depend on other keys, for all keys that have a meaning in this scene.
     fn complete(mut self) -> Self {
+        if self.time.scheme().has_inertia() {
+            self.time.lumping = Some(self.lumping());
+        }
         self.time.complete();
         let layouts: Vec<_> = self.bodies.iter().map(|body| self.filling(body).layout).collect();
         self.bodies.iter_mut().zip(layouts).for_each(|(body, layout)| body.layout = Some(layout));
@@ -362,6 +384,23 @@ impl Scene {
         problems.few("pressures", &self.pressures);
         for (path, load) in self.surface_loads() {
             load.check(problems, &path, &self.bodies, dimension);
+        }
+        self.check_obstacles(problems, dimension);
+    }
+
+    fn check_obstacles(&self, problems: &mut Problems, dimension: usize) {
+        for (i, obstacle) in problems.few("obstacles", &self.obstacles).iter().enumerate() {
+            let path = format!("obstacles[{i}]");
+            obstacle.check(problems, &path, dimension);
+            let again = self.obstacles.iter().take(i).any(|earlier| earlier.name == obstacle.name);
+            let allowed = "must differ from the names of the obstacles before";
+            problems.require(!again, &format!("{path}.name"), format_args!("{:?}", obstacle.name), allowed);
+        }
+        let from_files = self.bodies.iter().enumerate().filter(|(_, body)| body.particles.is_some());
+        for (i, _) in from_files.filter(|_| !self.obstacles.is_empty()) {
+            let allowed =
+                "must be a shape where there are obstacles: bodies touch them at points of the surface of their shape";
+            problems.refuse(&format!("bodies[{i}].particles"), "a file of particles", allowed);
         }
     }
 

@@ -33,7 +33,8 @@ pub struct Time {
     /// Newmark's γ (no unit), 0.5 ≤ γ ≤ 2β; values above 0.5 damp; for `"newmark"` only. Default 0.5.
     #[schemars(range(min = 0.5))]
     pub gamma: Option<f64>,
-    /// ε of the mass matrix (1 − ε) M + ε lumped(M), 0 (consistent) to 1 (lumped). Default 1.
+    /// ε of the mass matrix (1 − ε) M + ε lumped(M), 0 (consistent) to 1 (lumped). Default: 1; 0.1 where there
+    /// are obstacles.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub lumping: Option<f64>,
     /// The starting point of Newton's method in a step. Default: `"last_step"` in load steps, `"zero"` with inertia.
@@ -87,23 +88,16 @@ impl Time {
     /// use bfree::mechanics::schemes::Newmark;
     /// use bfree::scene::time::Time;
     ///
-    /// // A scene that says nothing of them gets the trapezoidal rule and a lumped mass.
+    /// // A scene that says nothing of them gets the trapezoidal rule.
     /// let time: Time = serde_json::from_str(r#"{"step": 0.1, "end": 1}"#)?;
-    /// assert_eq!((time.newmark(), time.lumping()), (Newmark::default(), 1.0));
-    /// let time: Time = serde_json::from_str(r#"{"step": 0.1, "end": 1, "beta": 0.3, "gamma": 0.6, "lumping": 0}"#)?;
-    /// assert_eq!((time.newmark(), time.lumping()), (Newmark { beta: 0.3, gamma: 0.6 }, 0.0));
+    /// assert_eq!(time.newmark(), Newmark::default());
+    /// let time: Time = serde_json::from_str(r#"{"step": 0.1, "end": 1, "beta": 0.3, "gamma": 0.6}"#)?;
+    /// assert_eq!(time.newmark(), Newmark { beta: 0.3, gamma: 0.6 });
     /// # Ok::<(), serde_json::Error>(())
     /// ```
     pub fn newmark(&self) -> Newmark {
         let default = Newmark::default();
         Newmark { beta: self.beta.unwrap_or(default.beta), gamma: self.gamma.unwrap_or(default.gamma) }
-    }
-
-    /// ε of the mass matrix.
-    ///
-    /// Example: [`Self::newmark`].
-    pub fn lumping(&self) -> f64 {
-        self.lumping.unwrap_or(1.0)
     }
 
     /// The starting point of Newton's method.
@@ -112,7 +106,7 @@ impl Time {
         self.initial_guess.unwrap_or(by_itself)
     }
 
-    /// Fills in the defaults of all keys that have a meaning for the scheme.
+    /// Fills in the defaults of all keys that have a meaning for the scheme, except `lumping`, which depends on the scene.
     pub(super) fn complete(&mut self) {
         self.scheme = Some(self.scheme());
         self.initial_guess = Some(self.initial_guess());
@@ -121,7 +115,6 @@ impl Time {
             (self.beta, self.gamma) = (Some(beta), Some(gamma));
         }
         if self.scheme().has_inertia() {
-            self.lumping = Some(self.lumping());
             self.projection.get_or_insert_default();
             self.wall_update.get_or_insert_default();
         }
@@ -151,7 +144,7 @@ impl Time {
         let beta_ok = beta >= lowest * (1.0 - 1e-12) && beta <= 2.0;
         let allowed = format!("must lie between gamma/2 = {lowest} and 2 (stability: 2 beta >= gamma >= 0.5)");
         problems.require(beta_ok, "time.beta", Number(beta), allowed);
-        problems.between("time.lumping", self.lumping(), 0.0, 1.0);
+        problems.between("time.lumping", self.lumping.unwrap_or(1.0), 0.0, 1.0);
         if let Some(Adaptive { tolerance }) = self.adaptive {
             let small = !problems.positive("time.adaptive.tolerance", tolerance) || tolerance <= 1.0;
             problems.require(small, "time.adaptive.tolerance", Number(tolerance), "must be at most 1");

@@ -5,7 +5,7 @@ use super::time::word;
 use super::{BodyUse, Scene};
 use crate::grid::{Grid, indices};
 use crate::material::{Law, Material, poissons_ratio};
-use crate::mechanics::loads::SurfaceLoad;
+use crate::mechanics::loads::{Obstacle, SurfaceLoad};
 use crate::shape::{EDGE, Fill, GridBox, Intersection, Shape, around};
 use crate::simulation::Simulation;
 use crate::tensor::{Deformation, Tensor, Vector};
@@ -83,6 +83,11 @@ impl Scene {
         all.extend(without_nodes(grid, "prescribed", prescribed));
         let initial = self.initial_velocity.iter().flat_map(|initial| &initial.nodes);
         all.extend(without_nodes(grid, "initial_velocity.nodes", initial.filter_map(|node| node.region.build())));
+        let moving = simulation.loads.obstacles.list.iter().map(Obstacle::moves);
+        all.extend(self.obstacles.iter().zip(moving).enumerate().filter_map(|(i, (obstacle, moves))| {
+            let shape = obstacle.shape.build()?;
+            obstacle.warning(&format!("obstacles[{i}]"), !moves && apart(grid, &shape))
+        }));
         let loaded = self.tractions.iter().zip(&simulation.loads.surface).enumerate();
         all.extend(loaded.filter_map(|(i, (traction, load))| {
             let body = self.bodies.iter().find(|body| body.name == traction.body)?;
@@ -112,6 +117,12 @@ impl Scene {
         let notes = [ghost_stiffness, precision, inertia, renewed].into_iter().flatten();
         notes.map(|note| format!("{note} the key; the next release refuses it"))
     }
+}
+
+/// Whether a shape lies outside the grid's box.
+fn apart<const D: usize>(grid: &Grid<D>, shape: &Shape<D>) -> bool {
+    let ((min, max), end) = (shape.bounding_box(), grid.position(grid.cells));
+    (0..D).any(|k| max[k] < grid.origin[k] || min[k] > end[k])
 }
 
 impl<const D: usize> Bodies<'_, D> {

@@ -1,6 +1,6 @@
 //! Balls.
 
-use super::{Face, Solid, axis};
+use super::{Face, Feature, Solid, axis};
 use crate::tensor::Vector;
 
 /// An interval, a disc or a ball.
@@ -19,6 +19,10 @@ impl<const D: usize> Solid<D> for Ball<D> {
         let length = from_center.norm();
         let normal = if length > 0.0 { from_center / length } else { axis(0, 1.0) };
         (length - self.radius, normal)
+    }
+
+    fn feature(&self, _: &Vector<f64, D>) -> Feature<D> {
+        Feature::Sphere { center: self.center, radius: self.radius, sign: 1.0 }
     }
 
     /// The tangent plane. Within a radius r the sphere, of radius R, departs from the plane by r²/2R.

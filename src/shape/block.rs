@@ -1,6 +1,6 @@
 //! Boxes.
 
-use super::{Face, Solid, axis};
+use super::{Face, Feature, Solid, axis};
 use crate::tensor::Vector;
 
 /// An axis-parallel box: an interval, a rectangle, a cuboid.
@@ -28,6 +28,17 @@ impl<const D: usize> Solid<D> for Block<D> {
         }
         let distance = outside.norm();
         if distance > 0.0 { (distance, outside / distance) } else { nearest }
+    }
+
+    /// Outside several slabs, an edge or a corner is nearest.
+    fn feature(&self, x: &Vector<f64, D>) -> Feature<D> {
+        let corner = Vector::from_fn(|k, _| x[k].clamp(self.min[k], self.max[k]));
+        let inside: Vec<usize> = (0..D).filter(|&k| corner[k] == x[k]).collect();
+        match (D - inside.len(), inside.as_slice()) {
+            (0 | 1, _) => Feature::plane(x, self.nearest(x)),
+            (_, [along]) => Feature::edge(corner, axis(*along, 1.0), 1.0),
+            _ => Feature::corner(corner, 1.0),
+        }
     }
 
     fn add_planes(&self, x: &Vector<f64, D>, radius: f64, planes: &mut Vec<Face<D>>) -> f64 {

@@ -1,6 +1,6 @@
 //! Unions, intersections and differences: the min or max of signed distances.
 
-use super::{Face, Shape, Solid, axis};
+use super::{Face, Feature, Shape, Solid, axis};
 use crate::tensor::Vector;
 
 /// The union of the parts.
@@ -26,11 +26,21 @@ fn only<'a, const D: usize>(parts: &'a [Shape<D>], x: &Vector<f64, D>, radius: f
     near.next().filter(|_| near.next().is_none())
 }
 
+/// The part with the smallest `sign` · d at `x`, the first of several; `None` without parts.
+fn first_part<'a, const D: usize>(parts: &'a [Shape<D>], x: &Vector<f64, D>, sign: f64) -> Option<&'a Shape<D>> {
+    let distance = |part: &Shape<D>| sign * part.signed_distance(x);
+    parts.iter().reduce(|a, b| if distance(b) < distance(a) { b } else { a })
+}
+
 impl<const D: usize> Solid<D> for Union<D> {
     /// d = min dᵢ
     fn nearest(&self, x: &Vector<f64, D>) -> Face<D> {
         let nowhere = (f64::INFINITY, axis(0, 1.0));
         self.0.iter().map(|part| part.solid().nearest(x)).fold(nowhere, |a, b| if b.0 < a.0 { b } else { a })
+    }
+
+    fn feature(&self, x: &Vector<f64, D>) -> Feature<D> {
+        first_part(&self.0, x, 1.0).map_or_else(|| Feature::plane(x, self.nearest(x)), |part| part.feature(x))
     }
 
     fn add_planes(&self, x: &Vector<f64, D>, radius: f64, planes: &mut Vec<Face<D>>) -> f64 {
@@ -53,6 +63,10 @@ impl<const D: usize> Solid<D> for Intersection<D> {
         self.0.iter().map(|part| part.solid().nearest(x)).fold(everywhere, |a, b| if b.0 > a.0 { b } else { a })
     }
 
+    fn feature(&self, x: &Vector<f64, D>) -> Feature<D> {
+        first_part(&self.0, x, -1.0).map_or_else(|| Feature::plane(x, self.nearest(x)), |part| part.feature(x))
+    }
+
     fn add_planes(&self, x: &Vector<f64, D>, radius: f64, planes: &mut Vec<Face<D>>) -> f64 {
         self.0.iter().map(|part| part.solid().add_planes(x, radius, planes)).fold(0.0, f64::max)
     }
@@ -72,6 +86,11 @@ impl<const D: usize> Solid<D> for Difference<D> {
     fn nearest(&self, x: &Vector<f64, D>) -> Face<D> {
         let (solid, hole) = (self.of.solid().nearest(x), self.minus.solid().nearest(x));
         if solid.0 >= -hole.0 { solid } else { (-hole.0, -hole.1) }
+    }
+
+    fn feature(&self, x: &Vector<f64, D>) -> Feature<D> {
+        let is_solid = self.of.signed_distance(x) >= -self.minus.signed_distance(x);
+        if is_solid { self.of.feature(x) } else { self.minus.feature(x).flipped() }
     }
 
     fn add_planes(&self, x: &Vector<f64, D>, radius: f64, planes: &mut Vec<Face<D>>) -> f64 {

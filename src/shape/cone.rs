@@ -1,6 +1,6 @@
 //! Cylinders and cones, truncated or not: a polygon that revolves about an axis.
 
-use super::{EDGE, Face, Polygon, Solid, axis};
+use super::{EDGE, Face, Feature, Polygon, Solid, axis};
 use crate::tensor::Vector;
 
 /// A cone between two discs, one of which may be a point. Equal discs make a cylinder. In 2D the solid is a trapezium or a triangle.
@@ -76,6 +76,11 @@ impl<const D: usize> Solid<D> for Cone<D> {
         let (place, outward) = self.in_profile(x);
         let (d, n) = self.profile.nearest(&place);
         (d, self.along * n[0] + outward * n[1])
+    }
+
+    fn feature(&self, x: &Vector<f64, D>) -> Feature<D> {
+        let profile = Box::new(self.profile.feature(&self.in_profile(x).0));
+        Feature::Revolved { end: self.ends[0], along: self.along, profile }
     }
 
     /// The planes of the section through `x`. In 3D a side departs from its plane by r²/2ρ, where ρ is the distance from the axis.

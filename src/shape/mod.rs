@@ -6,6 +6,7 @@ mod bounds;
 mod combined;
 mod cone;
 mod cut;
+mod feature;
 mod fill;
 mod grid_box;
 mod half_space;
@@ -26,6 +27,7 @@ pub use block::Block;
 pub use combined::{Difference, Intersection, Union};
 pub use cone::Cone;
 pub use cut::Facet;
+pub use feature::{Distance, Feature};
 pub(crate) use fill::around;
 pub use fill::{Fill, FillError, Filling, MAX_CANDIDATES, fill};
 pub use grid_box::GridBox;
@@ -55,6 +57,11 @@ type Part<const D: usize> = (f64, Vector<f64, D>);
 trait Solid<const D: usize> {
     /// The surface nearest to `x`.
     fn nearest(&self, x: &Vector<f64, D>) -> Face<D>;
+
+    /// The part of the surface nearest to `x`.
+    fn feature(&self, x: &Vector<f64, D>) -> Feature<D> {
+        Feature::plane(x, self.nearest(x))
+    }
 
     /// Adds the planes that approximate the surface within `radius` of `x`, each by its distance from `x` and its normal. Returns the
     /// largest distance there between the surface and the planes.
@@ -214,6 +221,22 @@ impl<const D: usize> Shape<D> {
     /// ```
     pub fn distance_and_normal(&self, x: &Vector<f64, D>) -> (f64, Vector<f64, D>) {
         self.solid().nearest(x)
+    }
+
+    /// The part of the surface nearest to `x`, as a smooth function around `x`.
+    ///
+    /// ```
+    /// use bfree::shape::{Block, Feature, Shape};
+    /// use bfree::tensor::Vector;
+    ///
+    /// // Outside a corner of a rectangle, points of equal distance lie on a circle about the corner.
+    /// let rectangle = Shape::from(Block { min: Vector::from([0.0, 0.0]), max: Vector::from([2.0, 1.0]) });
+    /// let corner = Feature::Sphere { center: Vector::from([2.0, 1.0]), radius: 0.0, sign: 1.0 };
+    /// assert_eq!(rectangle.feature(&Vector::from([2.5, 1.5])), corner);
+    /// assert!(matches!(rectangle.feature(&Vector::from([1.0, 1.5])), Feature::Plane { .. }));
+    /// ```
+    pub fn feature(&self, x: &Vector<f64, D>) -> Feature<D> {
+        self.solid().feature(x)
     }
 
     /// A box `(min, max)` that contains the solid: infinite for half-spaces, and with `min > max` for an empty solid.

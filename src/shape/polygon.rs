@@ -1,6 +1,6 @@
 //! Polygons: signed distances from their edges, and the check of outlines.
 
-use super::{Face, Solid};
+use super::{Face, Feature, Solid};
 use crate::tensor::Vector;
 
 /// Vertices and edges nearer to each other, relative to the size of the polygon, are taken to meet.
@@ -116,10 +116,14 @@ impl<const D: usize> Polygon<D> {
     }
 }
 
-impl<const D: usize> Solid<D> for Polygon<D> {
-    /// The nearest edge decides the side. If the nearest point is a vertex v, the two edges at v decide: d has the sign of
-    /// (x − v)·(n₁ + n₂).
-    fn nearest(&self, x: &Vector<f64, D>) -> Face<D> {
+/// The part of an outline nearest to a point.
+enum OutlinePart {
+    Edge(usize),
+    Vertex(usize),
+}
+
+impl<const D: usize> Polygon<D> {
+    fn nearest_part(&self, x: &Vector<f64, D>) -> OutlinePart {
         let n = self.vertices.len();
         let (mut squared, mut nearest) = (f64::INFINITY, (0, 0.0));
         for i in 0..n {
@@ -129,16 +133,37 @@ impl<const D: usize> Solid<D> for Polygon<D> {
                 (squared, nearest) = (s, (i, t));
             }
         }
-        let (i, t) = nearest;
-        if t > 0.0 && t < 1.0 {
-            let normal = self.normal(i);
-            return ((x - self.vertices[i]).dot(&normal), normal);
+        match nearest {
+            (i, t) if t > 0.0 && t < 1.0 => OutlinePart::Edge(i),
+            (i, t) => OutlinePart::Vertex(if t > 0.0 { (i + 1) % n } else { i }),
         }
-        let vertex = if t > 0.0 { (i + 1) % n } else { i };
+    }
+}
+
+impl<const D: usize> Solid<D> for Polygon<D> {
+    /// The nearest edge decides the side. If the nearest point is a vertex v, the two edges at v decide: d has the sign of
+    /// (x − v)·(n₁ + n₂).
+    fn nearest(&self, x: &Vector<f64, D>) -> Face<D> {
+        let n = self.vertices.len();
+        let vertex = match self.nearest_part(x) {
+            OutlinePart::Edge(i) => {
+                let normal = self.normal(i);
+                return ((x - self.vertices[i]).dot(&normal), normal);
+            }
+            OutlinePart::Vertex(vertex) => vertex,
+        };
         let between = self.normal((vertex + n - 1) % n) + self.normal(vertex);
         let away = x - self.vertices[vertex];
         let distance = if away.dot(&between) < 0.0 { -away.norm() } else { away.norm() };
         (distance, if distance == 0.0 { between / between.norm() } else { away / distance })
+    }
+
+    fn feature(&self, x: &Vector<f64, D>) -> Feature<D> {
+        let face = self.nearest(x);
+        match self.nearest_part(x) {
+            OutlinePart::Edge(_) => Feature::plane(x, face),
+            OutlinePart::Vertex(vertex) => Feature::corner(self.vertices[vertex], face.0.signum()),
+        }
     }
 
     /// The lines of the edges within `radius` of `x`.

@@ -1,6 +1,6 @@
 //! Solids turned and scaled: a similarity scales all distances by one factor.
 
-use super::{Face, Shape, Solid};
+use super::{Face, Feature, Shape, Solid};
 use crate::tensor::{Tensor, Vector, identity};
 
 /// A solid turned and scaled about a point, x ↦ c + s R (x − c).
@@ -30,6 +30,10 @@ impl<const D: usize> Similar<D> {
 impl<const D: usize> Solid<D> for Similar<D> {
     fn nearest(&self, x: &Vector<f64, D>) -> Face<D> {
         self.after(self.of.solid().nearest(&self.before(x)))
+    }
+
+    fn feature(&self, x: &Vector<f64, D>) -> Feature<D> {
+        self.of.feature(&self.before(x)).moved(&self.about, &self.rotation, self.factor)
     }
 
     fn add_planes(&self, x: &Vector<f64, D>, radius: f64, planes: &mut Vec<Face<D>>) -> f64 {

@@ -3,6 +3,7 @@
 mod balance;
 mod history;
 mod next_step;
+mod obstacles;
 mod preconditioner;
 mod report;
 mod settings;
@@ -14,6 +15,7 @@ mod work;
 pub use crate::mechanics::loads::Reaction;
 pub use history::History;
 pub use next_step::NextStep;
+pub use obstacles::ObstacleContact;
 pub use report::{AdvanceError, FailedAttempt, StepError, StepReport};
 pub use settings::{InitialGuess, Settings};
 pub use touching::Sharing;
@@ -69,9 +71,9 @@ pub struct Simulation<const D: usize, L = Material, A = Approximation> {
     pub settings: Settings,
     /// Time and step length.
     pub clock: Clock,
-    /// Work of gravity, tractions, pressure and moving walls since the start.
+    /// Work of gravity, tractions, pressure, moving walls and moving obstacles since the start.
     pub external_work: f64,
-    /// Energy dissipated by damping since the start.
+    /// Energy dissipated by damping and by friction at obstacles since the start.
     pub dissipated: f64,
     /// The point on the equilibrium path, for a scheme that follows one.
     pub path: Path,
@@ -166,7 +168,7 @@ impl<const D: usize, L, A> Simulation<D, L, A> {
         self.particles.rearrange(order);
         let last = self.history.equilibrium.iter_mut().map(|last| &mut last.loads);
         let loads = std::iter::once(&mut self.loads).chain(last);
-        let mut points = loads.flat_map(|loads| &mut loads.surface).flat_map(|load| &mut load.points).peekable();
+        let mut points = loads.flat_map(Loads::points_mut).peekable();
         if points.peek().is_some() {
             let mut places = vec![0; order.len()];
             order.iter().enumerate().for_each(|(to, &from)| places[from as usize] = to);

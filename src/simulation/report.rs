@@ -1,6 +1,6 @@
 //! Reports and errors of a step.
 
-use super::Sharing;
+use super::{ObstacleContact, Sharing};
 use crate::causes;
 use crate::mechanics::check::CheckError;
 use crate::mechanics::loads::Reaction;
@@ -23,6 +23,8 @@ pub struct StepReport<const D: usize> {
     pub projection_iterations: usize,
     /// Reactions, one for each of [`Loads::prescribed`](crate::mechanics::loads::Loads::prescribed).
     pub reactions: Vec<Reaction<D>>,
+    /// Contact with obstacles, one for each of [`Obstacles::list`](crate::mechanics::loads::Obstacles::list).
+    pub obstacles: Vec<ObstacleContact<D>>,
     /// Local error in grid spacings, if a tolerance is set. The error exceeds the tolerance only if the step could not be halved.
     pub error: Option<f64>,
     /// Whether the grid was reset before the step.
@@ -39,6 +41,13 @@ pub struct StepReport<const D: usize> {
     pub seconds: Stopwatch,
     /// Failed attempts at this step. Each failed or had too large an error, and was repeated with half its length.
     pub failed: Vec<FailedAttempt>,
+}
+
+impl<const D: usize> StepReport<D> {
+    /// Whether a body touches an obstacle.
+    pub fn touches_obstacle(&self) -> bool {
+        self.obstacles.iter().any(|contact| contact.area > 0.0)
+    }
 }
 
 /// A failed attempt at a step.
@@ -161,6 +170,19 @@ pub enum StepError {
     /// The tangent is not the derivative of the residual.
     #[error("the check of the tangent failed")]
     Tangent(#[from] CheckError),
+    /// A point of a body enters an obstacle too deeply in one step.
+    #[error(
+        "the point of a body at {position:?} enters the obstacle {obstacle:?} by {depth:.2} grid spacings in one step, or goes through: take \
+         shorter steps, a stiffer contact (obstacles[].stiffness), or a thicker obstacle"
+    )]
+    EntersObstacle {
+        /// Name of the obstacle.
+        obstacle: String,
+        /// Position of the point at the start of the step.
+        position: Vec<f64>,
+        /// Depth at the end of the step, in grid spacings.
+        depth: f64,
+    },
     /// A particle would leave the grid.
     #[error(
         "particle {particle} leaves the grid at {position:?}; enlarge the grid or hold the body with a boundary condition"

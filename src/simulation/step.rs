@@ -2,6 +2,7 @@
 
 use super::balance::Balance;
 use super::report::Spent;
+use super::work::Accounts;
 use super::{AdvanceError, FailedAttempt, Simulation, StepError, StepReport};
 use crate::approximation::ShapeFunction;
 use crate::material::Law;
@@ -45,7 +46,6 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let nodes = supports.active().clone();
         let prescribed = self.prescribed(&nodes);
         watch.lap(Phase::ShapeFunctions, supports.passes());
-
         let projected = self.nodal(&supports, &prescribed)?;
         spent.projection_iterations = projected.iterations;
         let nodal = projected.with_prescribed(&prescribed).extended(&Unknowns::new(&supports, &prescribed));
@@ -66,15 +66,15 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let mut update = update.with_dilatation(after).extended(&nodal, &equilibrium.unknowns);
         let error = self.local_error(&update, &supports, dt, &newton)?;
         self.smooth_and_check(&mut update, &supports, &nodal)?;
-        let (reactions, work, dissipated) = self.reactions_and_work(&equilibrium, &dphi, &before, &update)?;
+        let Accounts { reactions, work, dissipated, obstacles } =
+            self.accounts(&equilibrium, &dphi, &before, &update)?;
 
         // Nothing fails from here on.
         let (reset, feels_wall) = (self.history.resets_grid(), self.feels_wall(&prescribed));
+        self.accept_obstacles(&obstacles);
         let yielding = self.accept(update, &projected, &prescribed, &reactions, &supports);
         let sharing = self.sharing(&supports);
-        if scheme.follows_path() {
-            self.path = self.path.after(load, &dphi, dt);
-        }
+        self.path = if scheme.follows_path() { self.path.after(load, &dphi, dt) } else { self.path };
         let passes = supports.passes();
         self.store_supports(supports);
         watch.lap(Phase::Update, passes);
@@ -87,6 +87,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             newton,
             projection_iterations: projected.iterations,
             reactions,
+            obstacles: obstacles.contacts,
             error,
             reset,
             feels_wall,
@@ -192,9 +193,12 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
                 StepError::Newton(_)
                 | StepError::LawFailed { .. }
                 | StepError::Unbalanced { .. }
+                | StepError::EntersObstacle { .. }
                 | StepError::Inaccurate { .. } => true,
-                // The step may be too long to meet a wall.
-                StepError::LeftGrid { .. } => self.settings.error_tolerance.is_some(),
+                // The step may be too long to meet a wall or an obstacle.
+                StepError::LeftGrid { .. } => {
+                    self.settings.error_tolerance.is_some() || !self.loads.obstacles.list.is_empty()
+                }
                 // Forces are in balance before the end of the step, but det F ≤ 0 at its end.
                 StepError::Inadmissible(_) => self.settings.scheme.instant() < 1.0,
                 _ => false,

@@ -1,5 +1,6 @@
 //! Reactions of a step, and the work of all external forces.
 
+use super::obstacles::ObstacleUpdate;
 use super::{Reaction, Simulation, StepError};
 use crate::approximation::ShapeFunction;
 use crate::material::Law;
@@ -11,19 +12,29 @@ use crate::mechanics::trial::Trial;
 use crate::pooled::Pooled;
 use crate::tensor::Vector;
 
+/// Forces, work and losses of a step.
+pub(super) struct Accounts<const D: usize> {
+    pub reactions: Vec<Reaction<D>>,
+    /// The work of loads, of moving walls and of moving obstacles.
+    pub work: f64,
+    /// The energy dissipated by damping and by friction at obstacles.
+    pub dissipated: f64,
+    pub obstacles: ObstacleUpdate<D>,
+}
+
 impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
-    /// The reactions, the work of the step, and the energy dissipated by damping.
+    /// The reactions, the work of the step, and the energy dissipated by damping and friction.
     ///
     /// A reaction is the force at t_{n+1} plus J/Δt, with J the impulse, summed over a prescribed condition. The work of all external
     /// forces, including the reactions of moving walls, is Σ [½ (f_n + f_{n+1}) + J/Δt]·Δφ. In the mixed form, `dilatation` is that of the cells
     /// at t_n.
-    pub(super) fn reactions_and_work(
+    pub(super) fn accounts(
         &self,
         balanced: &Equilibrium<'_, D, L>,
         dphi: &[Vector<f64, D>],
         dilatation: &[f64],
         update: &Update<'_, D>,
-    ) -> Result<(Vec<Reaction<D>>, f64, f64), StepError> {
+    ) -> Result<Accounts<D>, StepError> {
         let (terms::Step { supports, nodal, .. }, phi) = (balanced.step, update.motion());
         let (t, dt) = (self.load(), self.clock.step());
         let mut end = balanced;
@@ -67,7 +78,9 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             let lost = |equilibrium: &Equilibrium<'_, D, L>, phi| equilibrium.forces(Role::Dissipates, phi);
             dissipated = mean_work(&lost(end, phi)?, &lost(&start, &before)?, dphi);
         }
-        Ok((reactions, work, dissipated))
+        let obstacles = self.obstacle_update(&balanced.step, phi)?;
+        let (work, dissipated) = (work + obstacles.work, dissipated + obstacles.friction_loss);
+        Ok(Accounts { reactions, work, dissipated, obstacles })
     }
 }
 

@@ -64,8 +64,18 @@ fn each_word_sets_what_its_row_of_the_table_says() -> Result<(), Failure> {
 /// A template with its own settings takes at least as many steps as the same template as a draft, which chooses spacing and step.
 #[test]
 fn a_draft_takes_no_more_steps_than_the_templates() -> Result<(), Failure> {
-    let dynamic =
-        ["rebound", "collision", "cantilever", "compaction", "riemann_jump", "ball_drop", "taylor", "collapse"];
+    let dynamic = [
+        "rebound",
+        "collision",
+        "cantilever",
+        "compaction",
+        "riemann_jump",
+        "ball_drop",
+        "taylor",
+        "collapse",
+        "bounce",
+        "rolling",
+    ];
     for name in dynamic {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenes/{name}.json"));
         let text = std::fs::read_to_string(&path)?;

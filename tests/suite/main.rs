@@ -23,6 +23,7 @@ mod loads;
 mod manual;
 mod memory;
 mod multigrid;
+mod obstacles;
 mod output;
 mod path;
 mod plasticity;

@@ -39,11 +39,11 @@ class Task:
     spacing: float
     corners: list[list[float]]  # of the body: a box by its two corners, in 2D a quadrilateral
     body_cells: list[int]  # of the body mesh, along each axis
-    fixed_axis: int  # the nodes where this coordinate is 0 are fixed
+    walls: list[list]  # [axis, coordinate, directions]: the nodes with that coordinate are fixed along the directions; the floor first
     young: float
     poisson: float
     density: float
-    gravity: list[float] | None
+    gravity: list[float] | None  # three components, in 2D too
     traction: list[float] | None  # on the side x = max of a 2D body
     solver_type: str  # of Kratos: static, quasi_static or dynamic
     step: float
@@ -120,6 +120,16 @@ def add_point_loads(task: Task, grid, first_node: int) -> None:
         condition.SetValue(Mpm.POINT_LOAD, force)
 
 
+def fix_walls(task: Task, grid) -> None:
+    """Fixes the nodes on the walls."""
+    for node in grid.Nodes:
+        position = [node.X, node.Y, node.Z]
+        for axis, coordinate, directions in task.walls:
+            if abs(position[axis] - coordinate) < 1e-9 * task.spacing:
+                for direction in directions:
+                    node.Fix(DISPLACEMENTS[direction])
+
+
 def build(task: Task):
     """The model and its solver, ready for the first step."""
     model = Kratos.Model()
@@ -140,10 +150,7 @@ def build(task: Task):
     solver.ImportModelPart()
     solver.PrepareModelPart()
     solver.AddDofs()
-    for node in grid.Nodes:
-        if [node.X, node.Y, node.Z][task.fixed_axis] < 1e-9 * task.spacing:
-            for variable in DISPLACEMENTS[: task.dimension]:
-                node.Fix(variable)
+    fix_walls(task, grid)
     solver.Initialize()
     solver._GetBuilderAndSolver().SetEchoLevel(2)  # shows the iterations of the linear solver
     return model, solver
@@ -156,12 +163,13 @@ def set_everywhere(entities, variable, value, info) -> None:
 
 
 def release(task: Task, points) -> None:
-    """Gravity, and the acceleration at the start: that of a free fall at free nodes, zero at fixed ones, linear between."""
+    """Gravity, and the acceleration at the start: that of a free fall at free nodes, zero on the floor, linear between."""
     info = points.ProcessInfo
+    floor_axis = task.walls[0][0]
     set_everywhere(points.Elements, Mpm.MP_VOLUME_ACCELERATION, task.gravity, info)
     for element in points.Elements:
         (position,) = element.CalculateOnIntegrationPoints(Mpm.MP_COORD, info)
-        share = min(position[task.fixed_axis] / task.spacing, 1.0)
+        share = min(position[floor_axis] / task.spacing, 1.0)
         element.SetValuesOnIntegrationPoints(Mpm.MP_ACCELERATION, [[share * g for g in task.gravity]], info)
 
 

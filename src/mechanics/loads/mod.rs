@@ -4,6 +4,7 @@ mod at_surface;
 mod curve;
 mod force_field;
 mod motion_step;
+mod obstacle;
 mod prescribed;
 mod rayleigh;
 mod rotation;
@@ -12,6 +13,7 @@ pub(crate) use at_surface::at_surface_points;
 pub use curve::{Curve, CurveError};
 pub use force_field::{Field, ForceField};
 pub use motion_step::MotionStep;
+pub use obstacle::{Obstacle, Obstacles, Pose};
 pub use prescribed::{Motion, Prescribed, PrescribedDof, Reaction, Selection, prescribed_dofs};
 pub use rayleigh::Rayleigh;
 pub use rotation::Rotation;
@@ -72,6 +74,8 @@ pub struct Loads<const D: usize> {
     pub field: Option<ForceField<D>>,
     /// Damping, if any.
     pub damping: Option<Rayleigh>,
+    /// Rigid obstacles that bodies touch.
+    pub obstacles: Obstacles<D>,
 }
 
 /// p A N of a particle under follower pressure.
@@ -88,6 +92,11 @@ impl<const D: usize> Loads<D> {
     pub(crate) fn loaded(&self, kind: impl Fn(&Pressing<D>) -> bool) -> usize {
         let of_kind = self.surface.iter().filter(|load| kind(&load.pressing));
         of_kind.flat_map(|load| &load.points).map(|point| point.particle).collect::<HashSet<_>>().len()
+    }
+
+    /// All points of surfaces that carry loads or may touch obstacles.
+    pub(crate) fn points_mut(&mut self) -> impl Iterator<Item = &mut SurfacePoint<D>> {
+        self.surface.iter_mut().flat_map(|load| &mut load.points).chain(&mut self.obstacles.points)
     }
 
     /// p A N of every particle under follower pressure at time `t`.

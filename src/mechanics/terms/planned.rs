@@ -31,6 +31,8 @@ pub(crate) fn planned<const D: usize>(
     };
     let pulled = loads.loaded(|pressing| matches!(pressing, Pressing::Traction(_)));
     let pressed = loads.loaded(|pressing| matches!(pressing, Pressing::Pressure(_)));
+    let (points, obstacles) = (loads.obstacles.points.len(), loads.obstacles.list.len());
+    let touched = format!("{points} points of surfaces; obstacles: {obstacles}");
     vec![
         ("inertia, lumped", moves && lumping > 0.0, inertia(format!("time.lumping = {lumping}, {scheme}"))),
         (
@@ -45,5 +47,11 @@ pub(crate) fn planned<const D: usize>(
         ("tractions", pulled > 0, format!("{pulled} loaded particles")),
         ("out-of-balance force", may_reset && !moves, "after a grid reset in load steps".into()),
         ("follower pressure", pressed > 0, format!("{pressed} loaded particles; makes the tangent unsymmetric")),
+        ("contact with obstacles", !loads.obstacles.list.is_empty(), touched),
+        (
+            "friction",
+            loads.obstacles.have_friction(),
+            "only at obstacles with friction; makes the tangent unsymmetric".into(),
+        ),
     ]
 }

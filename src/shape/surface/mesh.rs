@@ -119,6 +119,15 @@ impl Mesh {
         (a + ab * (vb / sum) + ac * (vc / sum), Foot::Inside)
     }
 
+    /// The corners of the triangle nearest to `x`, and its part.
+    pub fn nearest_triangle(&self, x: &Vector3<f64>) -> Option<([Vector3<f64>; 3], Foot)> {
+        let (_, triangle, foot) = self.tree.nearest(x, |triangle| {
+            let (at, part) = self.foot(triangle, x);
+            ((x - at).norm_squared(), part)
+        })?;
+        Some((self.corners(triangle), foot))
+    }
+
     /// d and ∇d. The normals of the triangles that meet at the nearest point decide the sign of d, each weighted by its angle (Bærentzen
     /// and Aanæs, 2005).
     pub fn nearest(&self, x: &Vector3<f64>) -> (f64, Vector3<f64>) {

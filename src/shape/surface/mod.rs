@@ -8,9 +8,9 @@ mod tree;
 pub use sound::SurfaceError;
 
 use super::bounds::Bounds;
-use super::{Face, Facet, GridBox, Part, Solid};
+use super::{Face, Facet, Feature, GridBox, Part, Solid};
 use crate::tensor::{Tensor, Vector};
-use mesh::Mesh;
+use mesh::{Foot, Mesh};
 use nalgebra::{Matrix3, Vector3};
 use std::sync::Arc;
 
@@ -90,6 +90,19 @@ impl<const D: usize> Solid<D> for Surface<D> {
     fn nearest(&self, x: &Vector<f64, D>) -> Face<D> {
         let (distance, normal) = self.mesh.nearest(&space(x));
         (distance, plane(normal))
+    }
+
+    fn feature(&self, x: &Vector<f64, D>) -> Feature<D> {
+        let face = self.nearest(x);
+        let Some((corners, foot)) = self.mesh.nearest_triangle(&space(x)) else { return Feature::plane(x, face) };
+        let corner = |i: usize| plane(corners[i % 3]);
+        match foot {
+            Foot::Inside => Feature::plane(x, face),
+            Foot::Edge(i) => {
+                Feature::edge(corner(i), plane((corners[(i + 1) % 3] - corners[i]).normalize()), face.0.signum())
+            }
+            Foot::Vertex(i) => Feature::corner(corner(i), face.0.signum()),
+        }
     }
 
     /// The planes of the triangles within `radius` of `x`, if there are few. Otherwise triangles with similar normals share one plane

@@ -107,6 +107,7 @@ studies!(
     compaction,
     loads,
     locking,
+    contact,
     expansion,
     robust,
     rebound,

@@ -48,6 +48,8 @@ const CELLS: Check = Check::Test("dilatation::");
 const FLOWS: Check = Check::Test("flow::");
 const BONDS: Check = Check::Test("contact::");
 const RESTARTS: Check = Check::Test("restart::");
+const TOUCHES: Check = Check::Study("contact");
+const OBSTACLES: Check = Check::Test("obstacles::");
 const SOLVER: Check = Check::Unit("solver::");
 const SOLIDS: Check = Check::Unit("shape::");
 const STORED: Check = Check::Unit("checkpoint::");
@@ -92,6 +94,19 @@ pub(super) const FAULTS: &[ShippedFault] = &[
     fault("mean dilatation: means of a kept grid stay where particles were", CELLS, KEPT),
     fault("mixed: the product lacks the compressibility", INCOMPRESSIBLE, POINTS),
     fault("mixed: the residual of a cell is that of half its volume", INCOMPRESSIBLE, POINTS),
+    fault("contact: the tangent lacks the curvature of the obstacle", TOUCHES, OBSTACLES),
+    fault("contact: friction does not feel the change of pressure", TOUCHES, LAWS),
+    fault("contact: the tangent does not turn with the obstacle", TOUCHES, OBSTACLES),
+    fault("contact: the force does not turn with the obstacle", TOUCHES, OBSTACLES),
+    fault("contact: an obstacle pulls", OBSTACLES, LAWS),
+    fault("contact: friction pushes forwards", OBSTACLES, LAWS),
+    fault("contact: the slip is not along the surface", TOUCHES, LAWS),
+    fault("contact: a slip does not move the anchor", OBSTACLES, LAWS),
+    fault("obstacles: friction loses nothing", OBSTACLES, LAWS),
+    fault("obstacle: it rests", OBSTACLES, LAWS),
+    fault("obstacles: the state of friction is not kept", OBSTACLES, LAWS),
+    fault("obstacles: a point may enter deeply in one step", OBSTACLES, LAWS),
+    fault("obstacles: the forces at the start of a step do no work", OBSTACLES, LAWS),
     fault("loads: a traction has the other sign", LOADS, TANGENT),
     fault("loads: the tangent of a pressure has a wrong sign", TANGENT, DYNAMICS),
     fault("unknowns: prescribed values are not cleared", DYNAMICS, POINTS),
@@ -134,6 +149,7 @@ pub(super) const FAULTS: &[ShippedFault] = &[
     fault("shapes: the edge of the GIMP function is twice as high", PATCH, DYNAMICS),
     fault("shapes: functions at a wall are a thousandth of s³ off", SHAPES, SOLIDS),
     fault("checkpoint: bonded bodies are forgotten", BONDS, KEPT),
+    fault("checkpoint: the anchors of friction are forgotten", OBSTACLES, LAWS),
     fault("checkpoint: accelerations are not restored", RESTARTS, KEPT),
     fault("checkpoint: the length of the step along a path is forgotten", RESTARTS, KEPT),
     fault("checkpoint: a restart resets the grid", RESTARTS, KEPT),

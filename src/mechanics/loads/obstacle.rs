@@ -1,0 +1,123 @@
+//! Rigid obstacles that bodies touch: their shape, their motion, and the state of their friction.
+
+use super::SurfacePoint;
+use super::prescribed::Motion;
+use crate::shape::Shape;
+use crate::tensor::{Tensor, Vector, identity};
+
+/// The obstacles, and the points of the bodies' surfaces that may touch them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Obstacles<const D: usize> {
+    /// The points.
+    pub points: Vec<SurfacePoint<D>>,
+    /// The obstacles.
+    pub list: Vec<Obstacle<D>>,
+}
+
+/// A rigid obstacle. Bodies touch it without adhesion, with Coulomb friction.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Obstacle<const D: usize> {
+    /// Name, for output.
+    pub name: String,
+    /// The shape at t = 0.
+    pub shape: Shape<D>,
+    /// The motion of each component; a component without motion rests.
+    pub motion: [Option<Motion<D>>; D],
+    /// The penalty stiffness (pressure per depth) in units of (Λ + 2G)/h of the body, > 0.
+    pub stiffness: f64,
+    /// The coefficient of friction μ, ≥ 0.
+    pub friction: f64,
+    /// The anchors of friction at t_n, one for each of [`Obstacles::points`], in the frame of the obstacle. The elastic slip of a point is
+    /// its distance from its anchor along the surface. Empty without friction.
+    pub anchors: Vec<Vector<f64, D>>,
+    /// The work of the moving obstacle on the bodies since the start.
+    pub work: f64,
+    /// The energy dissipated by friction since the start.
+    pub friction_loss: f64,
+}
+
+/// The rigid motion x = b + R X of an obstacle since t = 0. X is a position in the frame of the obstacle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pose<const D: usize> {
+    /// R
+    pub rotation: Tensor<f64, D>,
+    /// b
+    pub shift: Vector<f64, D>,
+}
+
+impl<const D: usize> Obstacle<D> {
+    /// The rigid motion up to time `t`.
+    ///
+    /// ```
+    /// use bfree::mechanics::loads::{Curve, Motion, Obstacle, Rotation};
+    /// use bfree::shape::Ball;
+    /// use bfree::tensor::Vector;
+    ///
+    /// // A disc that turns about the point (1, 0), by a quarter until t = 1.
+    /// let quarter = Curve::new(vec![[0.0, 0.0], [1.0, std::f64::consts::FRAC_PI_2]])?;
+    /// let turn = Motion::Rotation(Rotation::new(Vector::from([1.0, 0.0]), [0.0, 0.0, 1.0], quarter));
+    /// let disc = Ball { center: Vector::from([3.0, 0.0]), radius: 1.0 }.into();
+    /// let obstacle = Obstacle::new("disc", disc, [Some(turn.clone()), Some(turn)], 1.0, 0.0);
+    /// let center = obstacle.pose(1.0).to_space(&Vector::from([3.0, 0.0]));
+    /// assert!((center - Vector::from([1.0, 2.0])).norm() < 1e-15);
+    /// # Ok::<(), bfree::mechanics::loads::CurveError>(())
+    /// ```
+    pub fn pose(&self, t: f64) -> Pose<D> {
+        let moved = |x: &Vector<f64, D>| {
+            let of = |i: usize| self.motion[i].as_ref().map_or(0.0, |motion| motion.over(0.0, t, x, i).increment);
+            Vector::<f64, D>::from_fn(|i, _| of(i))
+        };
+        mutant!("obstacle: it rests": { return Pose { rotation: identity(), shift: Vector::zeros() }; });
+        let shift = moved(&Vector::zeros());
+        let mut rotation = identity::<f64, D>();
+        for k in 0..D {
+            let unit = Vector::from_fn(|i, _| if i == k { 1.0 } else { 0.0 });
+            rotation.set_column(k, &(unit + moved(&unit) - shift));
+        }
+        Pose { rotation, shift }
+    }
+
+    /// An obstacle that has not been touched yet.
+    pub fn new(
+        name: impl Into<String>,
+        shape: Shape<D>,
+        motion: [Option<Motion<D>>; D],
+        stiffness: f64,
+        friction: f64,
+    ) -> Self {
+        let name = name.into();
+        Self { name, shape, motion, stiffness, friction, anchors: Vec::new(), work: 0.0, friction_loss: 0.0 }
+    }
+
+    /// Whether the obstacle moves at any time.
+    pub fn moves(&self) -> bool {
+        self.motion.iter().flatten().any(|motion| *motion != Motion::Rest)
+    }
+}
+
+impl<const D: usize> Obstacles<D> {
+    /// Whether friction acts at an obstacle.
+    pub fn have_friction(&self) -> bool {
+        self.list.iter().any(|obstacle| obstacle.friction > 0.0)
+    }
+
+    /// Puts the anchors of friction to the points of surfaces at `positions` at time `t`.
+    pub(crate) fn anchor(&mut self, positions: &[Vector<f64, D>], t: f64) {
+        for obstacle in self.list.iter_mut().filter(|obstacle| obstacle.friction > 0.0) {
+            let pose = obstacle.pose(t);
+            obstacle.anchors = self.points.iter().map(|point| pose.to_frame(&positions[point.particle])).collect();
+        }
+    }
+}
+
+impl<const D: usize> Pose<D> {
+    /// X = Rᵀ (x − b), a position in the frame of the obstacle.
+    pub fn to_frame(&self, x: &Vector<f64, D>) -> Vector<f64, D> {
+        self.rotation.tr_mul(&(x - self.shift))
+    }
+
+    /// x = b + R X
+    pub fn to_space(&self, x: &Vector<f64, D>) -> Vector<f64, D> {
+        self.shift + self.rotation * x
+    }
+}

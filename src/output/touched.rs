@@ -1,0 +1,79 @@
+//! Obstacles that bodies touched during a run, for the report.
+
+use crate::mechanics::loads::Obstacles;
+use crate::simulation::ObstacleContact;
+use serde::{Deserialize, Serialize};
+
+/// An obstacle that bodies touched.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Touched {
+    /// Name of the obstacle.
+    pub obstacle: String,
+    /// The end of the first step with contact.
+    pub since: f64,
+    /// The end of the last step with contact so far.
+    pub until: f64,
+    /// The force on the obstacle at the end of the last step, by component.
+    pub force: Vec<f64>,
+    /// The largest norm of the force.
+    pub largest_force: f64,
+    /// The time of the largest force.
+    pub largest_at: f64,
+    /// The largest depth of a point in the obstacle (length).
+    pub largest_depth: f64,
+    /// The work of the moving obstacle on the bodies.
+    pub work: f64,
+    /// The energy dissipated by friction.
+    pub friction_loss: f64,
+}
+
+/// Adds a step that ended at `time`.
+pub(crate) fn see<const D: usize>(
+    touched: &mut Vec<Touched>,
+    time: f64,
+    obstacles: &Obstacles<D>,
+    contacts: &[ObstacleContact<D>],
+) {
+    for (obstacle, contact) in obstacles.list.iter().zip(contacts) {
+        let known = touched.iter().position(|one| one.obstacle == obstacle.name);
+        if known.is_none() && contact.area == 0.0 {
+            continue;
+        }
+        let at = known.unwrap_or(touched.len());
+        if known.is_none() {
+            touched.push(Touched {
+                obstacle: obstacle.name.clone(),
+                since: time,
+                until: time,
+                force: Vec::new(),
+                largest_force: 0.0,
+                largest_at: time,
+                largest_depth: 0.0,
+                work: 0.0,
+                friction_loss: 0.0,
+            });
+        }
+        let one = &mut touched[at];
+        if contact.area > 0.0 {
+            one.until = time;
+        }
+        one.force = contact.force.iter().copied().collect();
+        if contact.force.norm() > one.largest_force {
+            (one.largest_force, one.largest_at) = (contact.force.norm(), time);
+        }
+        one.largest_depth = one.largest_depth.max(contact.depth);
+        (one.work, one.friction_loss) = (contact.work, contact.friction_loss);
+    }
+}
+
+impl std::fmt::Display for Touched {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { obstacle, since, until, largest_force, largest_at, largest_depth, work, friction_loss, .. } = self;
+        write!(
+            f,
+            "{obstacle:?} was touched from t = {since} to {until}: largest force {largest_force:.6e} at t = {largest_at}, largest depth \
+             {largest_depth:.3e}, work {work:.6e}, friction loss {friction_loss:.6e}"
+        )
+    }
+}

@@ -1,0 +1,88 @@
+//! Rigid obstacles.
+
+use super::boundary::{Face, Rotation, Table};
+use super::shape::Shape;
+use crate::problems::Problems;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A rigid obstacle. The surfaces of all bodies touch it without adhesion, with a one-sided penalty and Coulomb friction. It rests, or has
+/// the motion given by one of `displacement`, `velocity` and `rotation`. Force, moment, area, work and friction loss of every step are in
+/// `obstacles.csv`.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Obstacle {
+    /// The unique name of the obstacle in output.
+    pub name: String,
+    /// The shape at t = 0. It may reach beyond the grid.
+    pub shape: Shape,
+    /// The coefficient of friction, 0 to 100. The tangent with friction is exact and unsymmetric. Default: 0.
+    #[serde(default)]
+    #[schemars(range(min = 0, max = 100))]
+    pub friction: f64,
+    /// The penalty stiffness, > 0: the pressure at a depth of one grid spacing, in units of Λ + 2G of the body. Default: 1.
+    #[serde(default = "default_stiffness")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub stiffness: f64,
+    /// A table of displacements since t = 0 (length); constant after the last row. A component that is null rests.
+    pub displacement: Option<Table>,
+    /// A table of velocities; constant after the last row. A component that is null rests.
+    pub velocity: Option<Table>,
+    /// A rotation about a fixed axis.
+    pub rotation: Option<Rotation>,
+}
+
+/// The stiffness of contact that delays a rebound by a few percent of the time of contact, and needs few Newton iterations.
+fn default_stiffness() -> f64 {
+    1.0
+}
+
+/// A larger stiffness gets a warning. At 100, the force of an impact rings with four times its value (`docs/src/obstacles.md`).
+const STIFFEST: f64 = 100.0;
+
+impl Obstacle {
+    /// The motion; at rest if none is given.
+    pub(super) fn motion(&self) -> Face {
+        self.given().into_iter().next().map_or(Face::Fixed, |(_, motion)| motion)
+    }
+
+    /// All given motions, with their keys; a checked scene has at most one.
+    fn given(&self) -> Vec<(&'static str, Face)> {
+        Face::motions([&self.displacement, &self.velocity], &self.rotation)
+    }
+
+    /// A warning about an obstacle that nothing can touch, or whose stiffness gains nothing.
+    pub(super) fn warning(&self, path: &str, apart: bool) -> Option<String> {
+        if apart {
+            return Some(format!("{path} rests outside the grid, and bodies stay inside it: nothing can touch it"));
+        }
+        (self.stiffness > STIFFEST).then(|| {
+            format!(
+                "{path}.stiffness = {:e} is above {STIFFEST}: the depth is negligible below that already, and Newton's method and the force \
+                 get worse; lower it",
+                self.stiffness
+            )
+        })
+    }
+
+    pub(super) fn check(&self, problems: &mut Problems, path: &str, dimension: usize) {
+        let name = format!("{path}.name");
+        problems.require(!self.name.is_empty(), &name, "an empty name", "must have at least one letter");
+        let printed = !self.name.contains(|c: char| c.is_control() || c == ',' || c == '"');
+        let allowed = "must be of letters that can be printed, without commas and quotes";
+        problems.require(printed, &name, format_args!("{:?}", self.name), allowed);
+        if let Some([min, max]) = self.shape.check(problems, &format!("{path}.shape"), dimension) {
+            let empty = min.iter().zip(&max).any(|(min, max)| max < min);
+            let allowed = "must hold something: its parts do not meet";
+            problems.require(!empty, &format!("{path}.shape"), "an empty shape", allowed);
+        }
+        problems.between(&format!("{path}.friction"), self.friction, 0.0, 100.0);
+        let allowed = "must be 0: in one dimension nothing slides";
+        problems.require(dimension > 1 || self.friction == 0.0, &format!("{path}.friction"), self.friction, allowed);
+        problems.positive(&format!("{path}.stiffness"), self.stiffness);
+        let given = self.given();
+        given.iter().for_each(|(_, motion)| motion.check(problems, path, dimension));
+        let keys: Vec<_> = given.iter().map(|(key, _)| *key).collect();
+        problems.require(keys.len() < 2, path, keys.join(" and "), "give one of them");
+    }
+}

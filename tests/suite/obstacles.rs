@@ -1,0 +1,179 @@
+//! Contact with rigid obstacles in whole runs: bodies leave freely, moving obstacles work, friction survives a restart, and wrong scenes are
+//! refused.
+
+use crate::support::{Failure, advance, assert_refused, built, in_threads, merged, restored, run_to, solid, with};
+use bfree::simulation::Simulation;
+use serde_json::{Value, json};
+
+/// A square of 4 × 4 cells above the floor y = 0.5, falling and sliding with friction.
+fn falling() -> Value {
+    merged(
+        json!({
+            "grid": { "size": [4, 2], "spacing": 0.125 },
+            "time": { "step": 0.01, "end": 1 },
+            "bodies": [merged(solid("square", 1000, json!({ "box": { "min": [0.5, 0.55], "max": [1, 1.05] } })), json!({ "velocity": [2, -1] }))]
+        }),
+        json!({ "obstacles": [{ "name": "floor", "shape": { "half_space": { "point": [0, 0.5], "normal": [0, 1] } }, "friction": 0.3 }] }),
+    )
+}
+
+#[test]
+fn a_body_bounces_off_an_obstacle_and_momentum_is_the_impulse() -> Result<(), Failure> {
+    let mut simulation: Simulation<2> = built(&falling())?;
+    let before = simulation.particles.momentum();
+    let (mut impulse, mut touched, mut last) = ([0.0; 2], false, [0.0; 2]);
+    while simulation.clock.time() < 0.3 {
+        let step = simulation.advance()?;
+        let force = step.obstacles[0].force;
+        // Newmark's trapezoidal rule takes the mean of the forces at both ends of a step.
+        (0..2).for_each(|i| impulse[i] += 0.5 * step.dt * (force[i] + last[i]));
+        last = [force[0], force[1]];
+        assert!(force[1] <= 0.0, "the floor pulls: {force}");
+        touched |= step.touches_obstacle();
+    }
+    let (after, scale) = (simulation.particles.momentum(), before.norm());
+    assert!(touched && after[1] > 0.5 * -before[1], "no rebound: {after}");
+    assert!((0..2).all(|i| (after[i] - before[i] + impulse[i]).abs() < 0.02 * scale), "{after} {before} {impulse:?}");
+    // It slides with friction, so the impulse along the floor is μ times that across the floor.
+    assert!((impulse[0] / -impulse[1] - 0.3).abs() < 0.02, "{impulse:?}");
+    let floor = &simulation.loads.obstacles.list[0];
+    assert!(floor.friction_loss > 0.0 && floor.work == 0.0);
+    Ok(())
+}
+
+#[test]
+fn the_work_of_a_moving_obstacle_is_the_energy_of_the_body() -> Result<(), Failure> {
+    // A plate pushes a square along; with damping out of the way, work is kinetic, strain and contact energy.
+    let scene = with(
+        falling(),
+        &[
+            ("/bodies/0/velocity", json!([0, 0])),
+            ("/time/step", json!(0.005)),
+            (
+                "/obstacles",
+                json!([{ "name": "plate", "shape": { "half_space": { "point": [0.49, 0], "normal": [1, 0] } },
+                         "velocity": [[0, [0, 0]], [0.2, [2, 0]]] }]),
+            ),
+        ],
+    );
+    let mut simulation: Simulation<2> = built(&scene)?;
+    run_to(&mut simulation, 0.4)?;
+    let energy = simulation.particles.kinetic_energy() + simulation.strain_energy() + simulation.contact_energy();
+    let plate = &simulation.loads.obstacles.list[0];
+    assert!((plate.work / simulation.external_work - 1.0).abs() < 1e-12, "{}", plate.work);
+    assert!((energy / plate.work - 1.0).abs() < 0.02, "{energy} {}", plate.work);
+    Ok(())
+}
+
+#[test]
+fn a_restart_gives_the_same_bits_while_friction_sticks() -> Result<(), Failure> {
+    let scene =
+        with(falling(), &[("/obstacles/0/friction", json!(2)), ("/gravity", json!({ "acceleration": [1, -9.81] }))]);
+    let start: Simulation<2> = built(&scene)?;
+    let mut simulation = start.clone();
+    while !simulation.advance()?.touches_obstacle() {}
+    let mut continued = restored(&simulation, &start)?;
+    assert_eq!(continued.loads.obstacles, simulation.loads.obstacles);
+    advance(&mut simulation, 5)?;
+    advance(&mut continued, 5)?;
+    assert_eq!(continued.particles, simulation.particles);
+    assert_eq!(continued.loads.obstacles, simulation.loads.obstacles);
+    Ok(())
+}
+
+#[test]
+fn the_number_of_threads_does_not_change_a_bit_of_contact() -> Result<(), Failure> {
+    let state = |threads| {
+        in_threads(threads, || {
+            let mut simulation: Simulation<2> = built(&falling())?;
+            advance(&mut simulation, 15)?;
+            Ok((simulation.particles, simulation.loads.obstacles))
+        })
+    };
+    assert_eq!(state(1)?, state(3)?);
+    Ok(())
+}
+
+#[test]
+fn a_step_that_would_enter_an_obstacle_deeply_is_halved() -> Result<(), Failure> {
+    // Per step the square falls by 0.8 spacings, and the floor is too soft to stop it.
+    let changes = [("/bodies/0/velocity", json!([0, -10])), ("/obstacles/0/stiffness", json!(0.01))];
+    let mut simulation: Simulation<2> = built(&with(falling(), &changes))?;
+    let step = simulation.advance()?;
+    let failed = step.failed.first().ok_or("the step was not halved")?;
+    let words = ["enters the obstacle \"floor\"", "grid spacings in one step", "shorter steps"];
+    assert!(words.iter().all(|word| failed.why.contains(word)), "{}", failed.why);
+    assert!(step.dt < 0.01 && step.obstacles[0].depth <= 0.25 * 0.125);
+    Ok(())
+}
+
+#[test]
+fn a_body_does_not_pass_a_thin_obstacle_silently() -> Result<(), Failure> {
+    // A sheet a tenth of a spacing thick, that the square would jump over in one step.
+    let sheet = json!([{ "name": "sheet", "shape": { "box": { "min": [0, 0.44], "max": [4, 0.4525] } } }]);
+    let changes = [("/bodies/0/velocity", json!([0, -70])), ("/obstacles", sheet)];
+    let mut simulation: Simulation<2> = built(&with(falling(), &changes))?;
+    let error = (0..20).find_map(|_| {
+        simulation
+            .advance()
+            .map_or_else(|error| Some(error.failed), |step| Some(step.failed).filter(|all| !all.is_empty()))
+    });
+    let failed = error.ok_or("the square passed")?;
+    assert!(failed.iter().any(|attempt| attempt.why.contains("or goes through")), "{}", failed[0].why);
+    Ok(())
+}
+
+#[test]
+fn a_turned_scene_has_turned_forces() -> Result<(), Failure> {
+    // The same impact on a floor and on a wall: x and y are exchanged.
+    let wall = with(
+        falling(),
+        &[
+            ("/grid/size", json!([2, 4])),
+            ("/bodies/0/shape/box", json!({ "min": [0.55, 0.5], "max": [1.05, 1] })),
+            ("/bodies/0/velocity", json!([-1, 2])),
+            ("/obstacles/0/shape/half_space", json!({ "point": [0.5, 0], "normal": [1, 0] })),
+        ],
+    );
+    let (mut on_floor, mut on_wall): (Simulation<2>, Simulation<2>) = (built(&falling())?, built(&wall)?);
+    for _ in 0..15 {
+        let [one, other] = [on_floor.advance()?, on_wall.advance()?].map(|step| step.obstacles[0]);
+        let scale = 1e-9 * one.force.norm().max(1.0);
+        assert!((one.force[0] - other.force[1]).abs() < scale && (one.force[1] - other.force[0]).abs() < scale);
+        assert!((one.area - other.area).abs() < 1e-12);
+    }
+    Ok(())
+}
+
+#[test]
+fn wrong_obstacles_are_refused() {
+    for (pointer, value, path, words) in [
+        ("/obstacles/0/friction", json!(-0.1), "obstacles[0].friction", &["-0.1", "0", "100"][..]),
+        ("/obstacles/0/stiffness", json!(0), "obstacles[0].stiffness", &["finite and > 0"]),
+        ("/obstacles/0/name", json!(""), "obstacles[0].name", &["empty"]),
+        ("/obstacles/0/displacement", json!([[0, [1, 0]]]), "obstacles[0].displacement[0][1][0]", &["must be 0"]),
+        (
+            "/obstacles/0/shape",
+            json!({ "intersection": [{ "ball": { "center": [0, 0], "radius": 1 } }, { "ball": { "center": [3, 0], "radius": 1 } }] }),
+            "obstacles[0].shape",
+            &["empty"],
+        ),
+    ] {
+        assert_refused(&with(falling(), &[(pointer, value)]).to_string(), path, words);
+    }
+    let twice = with(
+        falling(),
+        &[("/obstacles/0/velocity", json!([[0, [1, 0]]])), ("/obstacles/0/displacement", json!([[0, [0, 0]]]))],
+    );
+    assert_refused(&twice.to_string(), "obstacles[0]", &["displacement and velocity", "one of them"]);
+}
+
+#[test]
+fn a_body_that_starts_in_an_obstacle_is_refused_with_place_and_depth() {
+    let deep = with(falling(), &[("/obstacles/0/shape/half_space/point", json!([0, 0.6]))]);
+    let error = built::<2>(&deep).err().map(|error| error.to_string()).unwrap_or_default();
+    assert!(
+        ["obstacles[0]", "\"square\"", "\"floor\"", "0.400 grid spacings deep"].iter().all(|word| error.contains(word)),
+        "{error}"
+    );
+}

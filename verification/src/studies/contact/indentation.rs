@@ -1,0 +1,91 @@
+//! Obstacles pressed into bodies: a patch test, and Hertz's line contact.
+
+use super::{StudyError, built};
+use crate::report::{Bound, Report};
+use bfree::material::{Law, Material, MaterialState};
+use bfree::tensor::Tensor;
+use serde_json::json;
+use std::f64::consts::PI;
+
+const YOUNG: f64 = 1000.0;
+const POISSON: f64 = 0.3;
+
+/// E* = E/(1 − ν²)
+const PLANE: f64 = YOUNG / (1.0 - POISSON * POISSON);
+
+/// σ_yy at F = I + H.
+fn vertical_stress(law: &Material, h: &Tensor<f64, 2>) -> f64 {
+    let at = MaterialState::new(*h);
+    (at.f * law.stress(&at) * at.f.transpose() / at.jacobian)[(1, 1)]
+}
+
+/// A block that is free to widen is pressed by 1e-4 of its height: all stresses are those of uniaxial stress in plane strain.
+pub(super) fn patch() -> Result<Report, StudyError> {
+    let mut report = Report::new("patch test: error of the stress, worst particle", &["functions", "side of the block"]);
+    for functions in ["linear", "cubic"] {
+        let approximation = if functions == "linear" { json!("linear") } else { json!({ "bspline": { "degree": 3 } }) };
+        // On the grid, and with cut cells.
+        for side in [1.0, 1.05] {
+            let strain = 1e-4;
+            let scene = json!({
+                "grid": { "size": [2, 2], "spacing": 0.125 },
+                "approximation": approximation,
+                "time": { "step": 1, "end": 1, "scheme": "none" },
+                "bodies": [{ "name": "block", "density": 1, "shape": { "box": { "min": [0, 0], "max": [side, side] } },
+                             "material": { "neo_hookean": { "young": YOUNG, "poisson": POISSON } } }],
+                "boundary": { "left": "sliding", "bottom": "sliding" },
+                "obstacles": [{ "name": "plate", "shape": { "half_space": { "point": [0, side], "normal": [0, -1] } }, "stiffness": 10,
+                                "displacement": [[0, [0, 0]], [1, [0, -strain * side]]] }]
+            });
+            let mut simulation = built::<2>(&scene)?;
+            let step = simulation.advance()?;
+            let shortened = strain - step.obstacles[0].depth / side;
+            let exact = -PLANE * shortened;
+            let particles = &simulation.particles;
+            let law = &simulation.bodies[0].law;
+            let solid = (0..particles.len()).filter(|&p| particles.is_solid(p));
+            let error = |p: usize| (vertical_stress(law, &particles.displacement_gradient[p]) / exact - 1.0).abs();
+            let worst = solid.map(error).fold(0.0, f64::max);
+            report.push(&[functions, &side.to_string()], worst, Bound::AtMost(0.01));
+        }
+    }
+    report.note("The shortening is that of the plate less the depth of the penalty.");
+    Ok(report)
+}
+
+/// A rigid cylinder pressed into a wide block, half of it between planes of symmetry: p₀ = √(F E*/(π R)) and a = √(4 F R/(π E*)).
+pub(super) fn hertz() -> Result<Report, StudyError> {
+    let mut report = Report::new("Hertz, line contact: errors", &["cells over the contact", "quantity"]);
+    let (radius, half) = (10.0, 0.5);
+    for cells in [10, 20] {
+        let h = 2.0 * half / f64::from(cells);
+        let side = (12.0 * half / h).ceil() * h;
+        // The approach is that of the half width a in a half-space; the force follows from the computed contact.
+        let approach = half * half / radius;
+        let scene = json!({
+            "grid": { "size": [side, side + 2.0 * h], "spacing": h },
+            "time": { "step": 0.25, "end": 1, "scheme": "none" },
+            "bodies": [{ "name": "block", "density": 1, "shape": { "box": { "min": [0, 0], "max": [side, side] } },
+                         "material": { "neo_hookean": { "young": YOUNG, "poisson": POISSON } } }],
+            "boundary": { "left": "sliding", "bottom": "sliding" },
+            "obstacles": [{ "name": "cylinder", "shape": { "ball": { "center": [0, side + radius], "radius": radius } }, "stiffness": 10,
+                            "displacement": [[0, [0, 0]], [1, [0, -approach]]] }]
+        });
+        let mut simulation = built::<2>(&scene)?;
+        let mut contact = None;
+        while simulation.clock.time() < 1.0 - 1e-9 {
+            contact = simulation.advance()?.obstacles.first().copied();
+        }
+        let contact = contact.ok_or("no obstacle")?;
+        // Both halves.
+        let force = 2.0 * contact.force[1].abs();
+        let modulus = bfree::material::p_wave_modulus(&simulation.bodies[0].law);
+        let pressure = 10.0 * modulus / h * contact.depth;
+        let name = cells.to_string();
+        report.push(&[&name, "largest pressure"], (pressure / (force * PLANE / (PI * radius)).sqrt() - 1.0).abs(), Bound::AtMost(0.03));
+        let width = (4.0 * force * radius / (PI * PLANE)).sqrt();
+        report.push(&[&name, "half width"], (contact.area / width - 1.0).abs(), Bound::AtMost(0.5 * h / width + 0.03));
+    }
+    report.note("The half width is a sum of the points' areas, each half a cell wide: its bound has half a point more.");
+    Ok(report)
+}

@@ -1,0 +1,32 @@
+//! Contact with rigid obstacles: the tangent of every state of contact against dual numbers, and forces and motions against exact answers.
+
+mod bar;
+mod incline;
+mod indentation;
+mod tangent;
+mod wedge;
+
+use super::{Effort, Outcome, StudyError};
+use bfree::simulation::Simulation;
+use serde_json::Value;
+
+/// The summary in the list of studies.
+pub(super) const ABOUT: &str = "contact with obstacles: tangent, impact of a bar, sliding and rolling, a wedge, patch test, Hertz";
+
+pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
+    let mut reports = tangent::reports()?;
+    let (of_bar, table) = bar::report(effort)?;
+    reports.push(of_bar);
+    reports.push(incline::report(effort)?);
+    reports.push(wedge::report(effort)?);
+    reports.push(indentation::patch()?);
+    if *effort == Effort::Full {
+        reports.push(indentation::hertz()?);
+    }
+    Ok(Outcome { reports, tables: vec![table], ..Outcome::default() })
+}
+
+/// The simulation of a scene in JSON.
+fn built<const D: usize>(scene: &Value) -> Result<Simulation<D>, StudyError> {
+    Ok(bfree::scene::read(&scene.to_string(), &[])?.build::<D>(".".as_ref())?)
+}

@@ -1,0 +1,99 @@
+//! The tangent of contact and friction against dual numbers: every kind of surface, at rest and turned, for points that stick, that slip and
+//! that are pressed with no friction.
+
+use crate::check::regime::Regime;
+use crate::check::tangent::measure;
+use crate::prepared::Prepared;
+use crate::random::Random;
+use crate::report::Report;
+use crate::studies::StudyError;
+use crate::studies::tangent::{SPACING, cloud};
+use bfree::approximation::{Approximation, Bspline};
+use bfree::material::{Lame, NeoHookean};
+use bfree::mechanics::loads::{Curve, Motion, Obstacle, Rotation};
+use bfree::shape::{Ball, Block, Cone, HalfSpace, Shape};
+use bfree::simulation::Simulation;
+use bfree::tensor::Vector;
+
+/// A state of friction: its name, μ, and the distance of anchors from their points in spacings. Points are 0.05 spacings deep, and the
+/// smallest elastic slip is 0.005 spacings: in `stick` it is larger than μ times the depth.
+const STATES: [(&str, f64, f64); 4] =
+    [("no friction", 0.0, 0.0), ("stick", 0.05, 2e-3), ("stick, large pressure", 0.4, 2e-3), ("slip", 0.4, 0.1)];
+
+/// Obstacles around the point `x`, so that it lies in them: a plane, a ball, a hole, an edge and a corner, and a cylinder.
+fn shapes<const D: usize>(x: &Vector<f64, D>) -> Vec<(&'static str, Shape<D>)> {
+    let last = Vector::<f64, D>::from_fn(|k, _| if k == D - 1 { 1.0 } else { 0.3 });
+    let depth = 0.05 * SPACING;
+    let outside = x + last / last.norm() * (1.0 - depth);
+    let hole = Ball { center: x - last / last.norm() * (1.0 + depth), radius: 1.0 };
+    let everything = Block { min: x.add_scalar(-9.0), max: x.add_scalar(9.0) };
+    let mut shapes = vec![
+        ("plane", HalfSpace { point: x - last * depth, normal: -last }.into()),
+        ("ball", Ball { center: outside, radius: 1.0 }.into()),
+        ("hole", bfree::shape::Difference { of: Box::new(everything.into()), minus: Box::new(hole.into()) }.into()),
+    ];
+    if D == 3 {
+        let across = Vector::from_fn(|k, _| if k == 0 { 1.0 } else { 0.0 });
+        let cone = Cone::new([outside - across * 2.0, outside + across * 2.0], [0.8, 1.4]);
+        shapes.extend(cone.map(|cone| ("cone", cone.into())));
+    }
+    shapes
+}
+
+fn dimension<const D: usize>(report: &mut Report) -> Result<(), StudyError> {
+    let law = NeoHookean::ciarlet(Lame::from_young_poisson(1000.0, 0.3)?);
+    let mut random = Random::new(3);
+    let approximation = Approximation::from(Bspline::Cubic);
+    let mut simulation: Simulation<D, NeoHookean> = cloud(law, approximation, Regime::Moderate, &mut random)?;
+    simulation.loads.obstacles.points = std::mem::take(&mut simulation.loads.surface).remove(0).points;
+    let points = simulation.loads.obstacles.points.clone();
+    let middle = simulation.particles.position[points[points.len() / 2].particle];
+    for (shape, solid) in shapes(&middle) {
+        for turned in [false, true] {
+            if D == 1 && turned {
+                continue;
+            }
+            // In 1D there is no direction to slip.
+            for (name, friction, slip) in STATES.into_iter().take(if D == 1 { 1 } else { STATES.len() }) {
+                let motion = std::array::from_fn(|_| turned.then(|| turning(middle)));
+                let mut obstacle = Obstacle::new("obstacle", solid.clone(), motion, 1.0, friction);
+                let pose = obstacle.pose(simulation.clock.step());
+                let near = |at: usize| pose.to_frame(&simulation.particles.position[at]);
+                obstacle.anchors =
+                    points.iter().map(|point| near(point.particle) + random.vector() * (slip * SPACING)).collect();
+                simulation.loads.obstacles.list = vec![obstacle];
+                let prepared = Prepared::new(&simulation)?;
+                let size = if slip < 0.1 { 1e-4 } else { 1e-2 };
+                let mut dphi: Vec<Vector<f64, D>> =
+                    random.field(prepared.nodes.len()).iter().map(|x| x * (size * SPACING)).collect();
+                prepared.prescribe(&mut dphi);
+                let equilibrium = prepared.equilibrium(&simulation);
+                for measured in measure(&equilibrium, &dphi, SPACING, &mut random)? {
+                    let of_contact = ["contact", "friction", "whole product", "diagonal blocks"];
+                    if of_contact.contains(&measured.quantity.as_str()) {
+                        let way = if turned { "turned" } else { "at rest" };
+                        let labels = [&measured.quantity, shape, &D.to_string(), name, way];
+                        report.push(&labels, measured.value, measured.bound);
+                    }
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// A turn by a third of a radian in the first step.
+fn turning<const D: usize>(center: Vector<f64, D>) -> Motion<D> {
+    let angle = Curve::new(vec![[0.0, 0.0], [1e-3, 1.0 / 3.0]]).unwrap_or_else(|_| Curve::constant(0.0));
+    Motion::Rotation(Rotation::new(center, [0.2, -0.3, 1.0], angle))
+}
+
+pub(super) fn reports() -> Result<Vec<Report>, StudyError> {
+    let columns = ["quantity", "obstacle", "D", "state", "motion"];
+    let mut report = Report::new("tangent of contact: |K u - dual(R) u| / |K u|, bound min(64 eps k(F)^2, 1e-10)", &columns);
+    dimension::<1>(&mut report)?;
+    dimension::<2>(&mut report)?;
+    dimension::<3>(&mut report)?;
+    report.note("'hole' is the inside of a hole in a solid. The cone has the curvature of its side in 3D.");
+    Ok(vec![report])
+}
