@@ -8,8 +8,8 @@
 //!
 //! Under large pressures ε grows to μ p/k. Friction in stick is then −k s, and has a potential.
 //!
-//! The smallest elastic slip is a small part of the grid spacing. It does not depend on the pressure, so Newton's method finds the points that
-//! stick under small pressures, too.
+//! The smallest elastic slip is a small part of the grid spacing. This slip does not depend on the pressure, so Newton's method also finds
+//! the points that stick under small pressures.
 
 use crate::mechanics::loads::{Obstacles, Pose, SurfacePoint};
 use crate::scalar::Real;
@@ -31,7 +31,7 @@ enum State {
 
 /// The law of contact at one point that touches an obstacle.
 #[derive(Clone, Debug)]
-pub(crate) struct Touch<const D: usize> {
+pub(crate) struct ContactLaw<const D: usize> {
     /// The surface of the obstacle at the point.
     feature: Feature<D>,
     /// k
@@ -45,7 +45,7 @@ pub(crate) struct Touch<const D: usize> {
 }
 
 /// A point that touches an obstacle.
-pub(crate) struct Touching<'a, T, const D: usize> {
+pub(crate) struct ContactPoint<'a, T, const D: usize> {
     /// The number of the obstacle.
     pub obstacle: usize,
     /// The number of the point in [`Obstacles::points`].
@@ -55,21 +55,22 @@ pub(crate) struct Touching<'a, T, const D: usize> {
     /// The pose of the obstacle.
     pub pose: Pose<D>,
     /// The law there.
-    pub touch: Touch<D>,
+    pub law: ContactLaw<D>,
     /// The position of the point in the frame of the obstacle.
     pub y: Vector<T, D>,
 }
 
-/// All points that touch an obstacle at time `t`, by the `position` and the `stiffness` of a particle (pressure per depth). h is the grid `spacing`.
-pub(crate) fn touching<'a, T: Real, const D: usize>(
+/// All points that touch an obstacle at time `t`. `position` and `stiffness` (pressure per depth) are functions of the particle. `spacing` is
+/// that of the grid.
+pub(crate) fn contact_points<'a, T: Real, const D: usize>(
     Obstacles { points, list }: &'a Obstacles<D>,
     t: f64,
     spacing: f64,
     stiffness: impl Fn(usize) -> f64,
     position: impl Fn(usize) -> Vector<T, D>,
-) -> Vec<Touching<'a, T, D>> {
+) -> Vec<ContactPoint<'a, T, D>> {
     let poses: Vec<Pose<D>> = list.iter().map(|obstacle| obstacle.pose(t)).collect();
-    let mut touching = Vec::new();
+    let mut found = Vec::new();
     for (number, point) in points.iter().enumerate() {
         let x = position(point.particle);
         for (index, (obstacle, pose)) in list.iter().zip(&poses).enumerate() {
@@ -77,25 +78,24 @@ pub(crate) fn touching<'a, T: Real, const D: usize>(
             let at = y.map(T::value);
             // NaN touches nothing.
             if obstacle.shape.signed_distance(&at) < 0.0 {
-                let touch = Touch {
+                let law = ContactLaw {
                     feature: obstacle.shape.feature(&at),
                     stiffness: obstacle.stiffness * stiffness(point.particle),
                     friction: obstacle.friction,
                     elastic_slip: ELASTIC_SLIP * spacing,
                     anchor: obstacle.anchors.get(number).copied().unwrap_or(at),
                 };
-                touching.push(Touching { obstacle: index, number, point, pose: *pose, touch, y });
+                found.push(ContactPoint { obstacle: index, number, point, pose: *pose, law, y });
             }
         }
     }
-    touching
+    found
 }
 
-impl<const D: usize> Touching<'_, f64, D> {
+impl<const D: usize> ContactPoint<'_, f64, D> {
     /// The force on the body.
     pub fn force(&self) -> Vector<f64, D> {
-        let traction =
-            self.touch.traction(Response::Pressure, &self.y) + self.touch.traction(Response::Friction, &self.y);
+        let traction = self.law.traction(Response::Pressure, &self.y) + self.law.traction(Response::Friction, &self.y);
         self.pose.rotation * traction * self.point.area
     }
 }
@@ -109,7 +109,7 @@ pub(crate) enum Response {
     Friction,
 }
 
-impl<const D: usize> Touch<D> {
+impl<const D: usize> ContactLaw<D> {
     /// The traction on the body, per reference area.
     pub fn traction<T: Real>(&self, response: Response, y: &Vector<T, D>) -> Vector<T, D> {
         let Distance { distance, normal } = self.feature.at(y);
@@ -143,7 +143,8 @@ impl<const D: usize> Touch<D> {
     /// −∂t/∂y of the traction t.
     pub fn tangent(&self, response: Response, y: &Vector<f64, D>) -> Tensor<f64, D> {
         let Distance { distance, normal: n } = self.feature.at(y);
-        let (k, mu, curvature) = (self.stiffness, self.friction, self.feature.curvature(y));
+        let (k, mu) = (self.stiffness, self.friction);
+        let curvature = self.feature.curvature(y);
         if response == Response::Pressure {
             mutant!("contact: the tangent lacks the curvature of the obstacle": curvature = Tensor::zeros());
             // k (n ⊗ n + g ∇²g)

@@ -309,8 +309,8 @@ impl Scene {
     fn unsymmetric(&self) -> Option<&'static str> {
         let has_friction = self.laws().any(|law| !law.is_symmetric());
         let friction = has_friction.then_some("a law with friction makes");
-        let rubs = self.obstacles.iter().any(|obstacle| obstacle.friction > 0.0);
-        let friction = friction.or(rubs.then_some("obstacles with friction make"));
+        let has_rough_obstacle = self.obstacles.iter().any(|obstacle| obstacle.friction > 0.0);
+        let friction = friction.or(has_rough_obstacle.then_some("obstacles with friction make"));
         if self.pressures.is_empty() { friction } else { Some("pressures make") }
     }
 

@@ -6,21 +6,22 @@ use crate::problems::Problems;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A rigid obstacle. The surfaces of all bodies touch it without adhesion, with a one-sided penalty and Coulomb friction. It rests, or has
-/// the motion given by one of `displacement`, `velocity` and `rotation`. Force, moment, area, work and friction loss of every step are in
+/// A rigid obstacle. The surfaces of all bodies touch the obstacle without adhesion, with a one-sided penalty and Coulomb friction. The
+/// obstacle rests, or has the motion given by one of `displacement`, `velocity` and `rotation`. Force, moment, area, work and friction loss of every step are in
 /// `obstacles.csv`.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Obstacle {
     /// The unique name of the obstacle in output.
     pub name: String,
-    /// The shape at t = 0. It may reach beyond the grid.
+    /// The shape at t = 0. The shape may reach beyond the grid.
     pub shape: Shape,
     /// The coefficient of friction, 0 to 100. The tangent with friction is exact and unsymmetric. Default: 0.
     #[serde(default)]
     #[schemars(range(min = 0, max = 100))]
     pub friction: f64,
-    /// The penalty stiffness, > 0: the pressure at a depth of one grid spacing, in units of Λ + 2G of the body. Default: 1.
+    /// The penalty stiffness, > 0: the pressure at a depth of one grid spacing, in units of Λ + 2G of the body, or of 4G where that is less.
+    /// Default: 1.
     #[serde(default = "default_stiffness")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub stiffness: f64,

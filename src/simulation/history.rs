@@ -1,6 +1,7 @@
 //! The history of a simulation: the state of a grid that is not reset, and what decides when to reset it (`mechanics::reference`).
 
-use super::{Reaction, Simulation};
+use super::Simulation;
+use super::work::Accounts;
 use crate::approximation::ShapeFunction;
 use crate::material::Law;
 use crate::mechanics::loads::PrescribedDof;
@@ -70,16 +71,19 @@ impl<const D: usize, L, A> Simulation<D, L, A> {
 }
 
 impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
-    /// Writes a step to the particles, and decides whether the next step resets the grid. `projected` is the nodal state at t_n without the
+    /// Writes a step to the particles and its work to the accounts, and decides whether the next step resets the grid. `projected` is the nodal state at t_n without the
     /// prescribed values. Returns the share of the volume of plastic bodies that flowed plastically.
     pub(super) fn accept(
         &mut self,
         update: Update<'_, D>,
         projected: &Nodal<D>,
         prescribed: &[PrescribedDof],
-        reactions: &[Reaction<D>],
+        accounts: &Accounts<D>,
         supports: &Supports<D>,
     ) -> f64 {
+        self.external_work += accounts.work;
+        self.dissipated += accounts.dissipated;
+        self.accept_obstacles(&accounts.obstacles);
         let dt = self.clock.step();
         let field_positions = self.field_positions();
         let mut grid = None;
@@ -101,7 +105,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             self.particles.reference = None;
             if !self.settings.scheme.has_inertia() {
                 let touching = self.bodies_touch(supports);
-                let last = LastEquilibrium::new(&self.loads, reactions.to_vec(), touching, field_positions);
+                let last = LastEquilibrium::new(&self.loads, accounts.reactions.clone(), touching, field_positions);
                 self.history.equilibrium = Some(last);
             }
         }

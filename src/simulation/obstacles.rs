@@ -3,9 +3,9 @@
 use super::{Simulation, StepError};
 use crate::approximation::ShapeFunction;
 use crate::material::Law;
-use crate::mechanics::contact::{Response, Touching, touching};
+use crate::mechanics::contact::{ContactPoint, Response, contact_points};
 use crate::mechanics::loads::{Obstacle, Pose};
-use crate::mechanics::terms::{Contact, Step, penalties};
+use crate::mechanics::terms::{ObstacleForce, Step, penalties};
 use crate::shape::Shape;
 use crate::tensor::Vector;
 use nalgebra::Vector3;
@@ -13,7 +13,7 @@ use nalgebra::Vector3;
 /// A point may enter an obstacle in one step by this many spacings at most. A longer step is repeated with half its length.
 const DEEPEST_ENTRY: f64 = 0.25;
 
-/// The distance of the places on its way at which a point is tested for an obstacle, in spacings, and the largest number of places.
+/// The path of a point in a step is tested for obstacles at places this far apart, in spacings, and at this many places at most.
 const SAMPLED: f64 = 0.05;
 const MOST_SAMPLES: f64 = 1000.0;
 
@@ -63,7 +63,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// The contact at the end of a step, with the nodal motion `phi` since the last grid reset.
     ///
     /// # Errors
-    /// A point that was outside an obstacle at t_n is deep in the obstacle.
+    /// A point enters an obstacle too deeply, or goes through it.
     pub(super) fn obstacle_update(
         &self,
         step: &Step<'_, D, L>,
@@ -75,36 +75,34 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         }
         let dt = self.clock.step();
         let end = Step { time: self.load() + dt, ..*step };
-        let (start_poses, end_poses) = (self.poses(self.load()), self.poses(end.time));
-        let touching = Contact::pressure(&end).map_or_else(Vec::new, |contact| contact.touching(phi));
+        let poses = [self.poses(self.load()), self.poses(end.time)];
         let positions = self.point_positions(step, phi);
-        let poses = [start_poses, end_poses];
         self.check_entry(&poses, &positions)?;
-        let [start_poses, end_poses] = poses;
-        let anchors = obstacles.list.iter().zip(&end_poses).map(|(one, pose)| free_anchors(one, pose, &positions));
+        let anchors = obstacles.list.iter().zip(&poses[1]).map(|(one, pose)| free_anchors(one, pose, &positions));
         let mut update = ObstacleUpdate { anchors: anchors.collect(), ..ObstacleUpdate::default() };
         for one in &obstacles.list {
             let (work, friction_loss) = (one.work, one.friction_loss);
             update.contacts.push(ObstacleContact { work, friction_loss, ..ObstacleContact::NONE });
         }
-        for one in &touching {
-            let Touching { obstacle, number, point, pose, touch, y } = one;
-            let (contact, force) = (&mut update.contacts[*obstacle], one.force());
+        for one in &points_at(&end, phi) {
+            let ContactPoint { obstacle, number, point, pose, law, y } = one;
+            let contact = &mut update.contacts[*obstacle];
+            let force = one.force();
             let arm = pose.rotation * (y - middle(&obstacles.list[*obstacle]));
             contact.force -= force;
             contact.moment = add(contact.moment, moment(&arm, &-force));
             contact.area += point.area;
-            contact.depth = contact.depth.max(touch.depth(y));
+            contact.depth = contact.depth.max(law.depth(y));
             if let Some(anchor) = update.anchors[*obstacle].get_mut(*number) {
-                *anchor = touch.new_anchor(y);
+                *anchor = law.new_anchor(y);
             }
-            update.add_work(one, [start_poses[*obstacle], end_poses[*obstacle]], &self.way(one, &positions));
+            update.add_work(one, &poses, &self.ends(one, &positions));
         }
         let before: Vec<_> = step.nodal.moved(step.supports.nodes()).collect();
         let start = Step { time: self.load(), ..*step };
-        for one in Contact::pressure(&start).map_or_else(Vec::new, |contact| contact.touching(&before)) {
+        for one in points_at(&start, &before) {
             mutant!("obstacles: the forces at the start of a step do no work": { break; });
-            update.add_work(&one, [start_poses[one.obstacle], end_poses[one.obstacle]], &self.way(&one, &positions));
+            update.add_work(&one, &poses, &self.ends(&one, &positions));
         }
         Ok(update)
     }
@@ -117,7 +115,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     }
 
     /// The positions of a point at both ends of the step.
-    fn way(&self, one: &Touching<'_, f64, D>, positions: &[Vector<f64, D>]) -> [Vector<f64, D>; 2] {
+    fn ends(&self, one: &ContactPoint<'_, f64, D>, positions: &[Vector<f64, D>]) -> [Vector<f64, D>; 2] {
         [self.particles.position[one.point.particle], positions[one.number]]
     }
 
@@ -154,25 +152,25 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     }
 
     /// The energy stored in the contact with obstacles: Σ ½ k g² A.
-    ///
     pub fn contact_energy(&self) -> f64 {
         let (particles, penalties) = (&self.particles, penalties(&self.bodies, self.grid.spacing));
         let stiffness = |p: usize| penalties[particles.body[p] as usize];
         let touching =
-            touching(&self.loads.obstacles, self.load(), self.grid.spacing, stiffness, |p| particles.position[p]);
-        touching.iter().fold(0.0, |sum, one| sum + one.touch.energy(&one.y) * one.point.area)
+            contact_points(&self.loads.obstacles, self.load(), self.grid.spacing, stiffness, |p| particles.position[p]);
+        touching.iter().fold(0.0, |sum, one| sum + one.law.energy(&one.y) * one.point.area)
     }
 }
 
 impl<const D: usize> ObstacleUpdate<D> {
-    /// Adds half the work of a force at one end of the step: the trapezoidal rule. The obstacle moves between two poses, and the point
-    /// between two positions. Friction loses the work along the way of the point over the obstacle.
-    fn add_work(&mut self, one: &Touching<'_, f64, D>, poses: [Pose<D>; 2], positions: &[Vector<f64, D>; 2]) {
+    /// Adds half the work of a force at one end of the step: the trapezoidal rule. The obstacle moves between the `poses` at both ends of the
+    /// step, and the point between the `positions`. Friction loses the work along the motion of the point relative to the obstacle.
+    fn add_work(&mut self, one: &ContactPoint<'_, f64, D>, poses: &[Vec<Pose<D>>; 2], positions: &[Vector<f64, D>; 2]) {
+        let [start, end] = [&poses[0][one.obstacle], &poses[1][one.obstacle]];
         let contact = &mut self.contacts[one.obstacle];
-        let moved = poses[1].to_space(&one.y) - poses[0].to_space(&one.y);
+        let moved = end.to_space(&one.y) - start.to_space(&one.y);
         let work = 0.5 * one.force().dot(&moved);
-        let way = poses[1].to_frame(&positions[1]) - poses[0].to_frame(&positions[0]);
-        let loss = -0.5 * one.point.area * one.touch.traction(Response::Friction, &one.y).dot(&way);
+        let relative = end.to_frame(&positions[1]) - start.to_frame(&positions[0]);
+        let loss = -0.5 * one.point.area * one.law.traction(Response::Friction, &one.y).dot(&relative);
         mutant!("obstacles: friction loses nothing": loss = 0.0);
         contact.work += work;
         self.work += work;
@@ -181,13 +179,21 @@ impl<const D: usize> ObstacleUpdate<D> {
     }
 }
 
-/// The depth in spacings at which a point is refused that moves straight between two positions in the frame of an obstacle: it was outside and
-/// ends too deeply inside, or it goes through the obstacle.
+/// All points that touch an obstacle at the time of `step`, with the nodal motion `phi` since the last grid reset.
+fn points_at<'a, const D: usize, L: Law>(
+    step: &Step<'a, D, L>,
+    phi: &[Vector<f64, D>],
+) -> Vec<ContactPoint<'a, f64, D>> {
+    ObstacleForce::pressure(step).map_or_else(Vec::new, |force| force.contact_points(phi))
+}
+
+/// The depth, in spacings, of a point that enters an obstacle too deeply or goes through it; `None` for an allowed motion. The point moves
+/// straight between two positions in the frame of the obstacle.
 fn entry<const D: usize>(shape: &Shape<D>, [start, end]: &[Vector<f64, D>; 2], h: f64) -> Option<f64> {
-    let way = (end - start).norm();
+    let length = (end - start).norm();
     let before = shape.signed_distance(start);
     // A positive distance is at most the distance of the surface. NaN stays outside.
-    if before >= way || before.is_nan() {
+    if before >= length || before.is_nan() {
         return None;
     }
     let (after, normal) = shape.distance_and_normal(end);
@@ -199,7 +205,7 @@ fn entry<const D: usize>(shape: &Shape<D>, [start, end]: &[Vector<f64, D>; 2], h
     if depth > DEEPEST_ENTRY {
         return Some(depth);
     }
-    let samples = (way / (SAMPLED * h)).ceil().min(MOST_SAMPLES);
+    let samples = (length / (SAMPLED * h)).ceil().min(MOST_SAMPLES);
     let at = |sample: f64| shape.signed_distance(&(start + (end - start) * (sample / samples)));
     let deepest = (1..samples as u32).map(|sample| at(f64::from(sample))).fold(0.0, f64::min);
     (after >= 0.0 && deepest < 0.0).then_some(-deepest / h)

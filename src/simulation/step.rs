@@ -2,7 +2,6 @@
 
 use super::balance::Balance;
 use super::report::Spent;
-use super::work::Accounts;
 use super::{AdvanceError, FailedAttempt, Simulation, StepError, StepReport};
 use crate::approximation::ShapeFunction;
 use crate::material::Law;
@@ -46,6 +45,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let nodes = supports.active().clone();
         let prescribed = self.prescribed(&nodes);
         watch.lap(Phase::ShapeFunctions, supports.passes());
+
         let projected = self.nodal(&supports, &prescribed)?;
         spent.projection_iterations = projected.iterations;
         let nodal = projected.with_prescribed(&prescribed).extended(&Unknowns::new(&supports, &prescribed));
@@ -66,28 +66,26 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let mut update = update.with_dilatation(after).extended(&nodal, &equilibrium.unknowns);
         let error = self.local_error(&update, &supports, dt, &newton)?;
         self.smooth_and_check(&mut update, &supports, &nodal)?;
-        let Accounts { reactions, work, dissipated, obstacles } =
-            self.accounts(&equilibrium, &dphi, &before, &update)?;
+        let accounts = self.accounts(&equilibrium, &dphi, &before, &update)?;
 
         // Nothing fails from here on.
         let (reset, feels_wall) = (self.history.resets_grid(), self.feels_wall(&prescribed));
-        self.accept_obstacles(&obstacles);
-        let yielding = self.accept(update, &projected, &prescribed, &reactions, &supports);
+        let yielding = self.accept(update, &projected, &prescribed, &accounts, &supports);
         let sharing = self.sharing(&supports);
-        self.path = if scheme.follows_path() { self.path.after(load, &dphi, dt) } else { self.path };
+        if scheme.follows_path() {
+            self.path = self.path.after(load, &dphi, dt);
+        }
         let passes = supports.passes();
         self.store_supports(supports);
         watch.lap(Phase::Update, passes);
-        self.external_work += work;
-        self.dissipated += dissipated;
         self.clock.advance_and_grow_if(self.may_grow(error, &newton));
         Ok(StepReport {
             dt,
             active_nodes: nodes.len(),
             newton,
             projection_iterations: projected.iterations,
-            reactions,
-            obstacles: obstacles.contacts,
+            reactions: accounts.reactions,
+            obstacles: accounts.obstacles.contacts,
             error,
             reset,
             feels_wall,

@@ -23,7 +23,7 @@ pub struct Obstacle<const D: usize> {
     pub shape: Shape<D>,
     /// The motion of each component; a component without motion rests.
     pub motion: [Option<Motion<D>>; D],
-    /// The penalty stiffness (pressure per depth) in units of (Λ + 2G)/h of the body, > 0.
+    /// The penalty stiffness (pressure per depth) in units of min(Λ + 2G, 4G)/h of the body, > 0.
     pub stiffness: f64,
     /// The coefficient of friction μ, ≥ 0.
     pub friction: f64,

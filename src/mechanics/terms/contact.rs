@@ -4,7 +4,7 @@
 use super::term::{FunctionsAt, Linearized, LinearizedTerm, Step, Sum, Term, summed};
 use crate::material::{Law, p_wave_modulus, poissons_ratio};
 use crate::mechanics::constitutive::{Inadmissible, Part};
-use crate::mechanics::contact::{Response, Touching, touching};
+use crate::mechanics::contact::{ContactPoint, Response, contact_points};
 use crate::mechanics::loads::Pose;
 use crate::mechanics::sweep::{Number, Supports};
 use crate::mechanics::trial::Trial;
@@ -12,14 +12,14 @@ use crate::particles::Body;
 use crate::tensor::{Tensor, Vector};
 
 /// The pressure of all obstacles, or their friction.
-pub(crate) struct Contact<'a, const D: usize, L> {
+pub(crate) struct ObstacleForce<'a, const D: usize, L> {
     step: Step<'a, D, L>,
     response: Response,
     /// The pressure per depth of every body, for a penalty stiffness of 1.
     stiffness: Vec<f64>,
 }
 
-impl<'a, const D: usize, L: Law> Contact<'a, D, L> {
+impl<'a, const D: usize, L: Law> ObstacleForce<'a, D, L> {
     pub(crate) fn pressure(step: &Step<'a, D, L>) -> Option<Self> {
         Self::of(step, Response::Pressure, !step.loads.obstacles.list.is_empty())
     }
@@ -33,11 +33,11 @@ impl<'a, const D: usize, L: Law> Contact<'a, D, L> {
     }
 
     /// All points that touch an obstacle at Δφ.
-    pub(crate) fn touching<T: Number>(&self, dphi: &[Vector<T, D>]) -> Vec<Touching<'a, T, D>> {
+    pub(crate) fn contact_points<T: Number>(&self, dphi: &[Vector<T, D>]) -> Vec<ContactPoint<'a, T, D>> {
         let Step { particles, supports, loads, time, .. } = self.step;
         let reference = particles.reference().position;
         let stiffness = |p: usize| self.stiffness[particles.body[p] as usize];
-        touching(&loads.obstacles, time, supports.grid().spacing, stiffness, |p| {
+        contact_points(&loads.obstacles, time, supports.grid().spacing, stiffness, |p| {
             supports.value_at(p, dphi) + reference[p].map(T::lit)
         })
     }
@@ -57,7 +57,7 @@ pub(crate) fn penalties<L: Law>(bodies: &[Body<L>], spacing: f64) -> Vec<f64> {
     bodies.iter().map(|body| modulus(body) / spacing).collect()
 }
 
-impl<const D: usize, L: Law> Term<D> for Contact<'_, D, L> {
+impl<const D: usize, L: Law> Term<D> for ObstacleForce<'_, D, L> {
     fn name(&self) -> &'static str {
         match self.response {
             Response::Pressure => "contact",
@@ -66,9 +66,9 @@ impl<const D: usize, L: Law> Term<D> for Contact<'_, D, L> {
     }
 
     fn add_at_nodes<T: Number>(&self, dphi: &[Vector<T, D>], out: &mut [Vector<T, D>]) {
-        for Touching { point, pose, touch, y, .. } in self.touching(dphi) {
-            let force = pose.rotation.map(T::lit) * touch.traction(self.response, &y) * T::lit(point.area);
-            mutant!("contact: the force does not turn with the obstacle": force = touch.traction(self.response, &y) * T::lit(point.area));
+        for ContactPoint { point, pose, law, y, .. } in self.contact_points(dphi) {
+            let force = pose.rotation.map(T::lit) * law.traction(self.response, &y) * T::lit(point.area);
+            mutant!("contact: the force does not turn with the obstacle": force = law.traction(self.response, &y) * T::lit(point.area));
             for (node, n, _) in self.step.supports.of(point.particle) {
                 out[node] -= force * T::lit(n);
             }
@@ -77,13 +77,13 @@ impl<const D: usize, L: Law> Term<D> for Contact<'_, D, L> {
 
     /// Σ ½ k g² A
     fn energy<T: Number>(&self, dphi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>> {
-        let energy = |one: Touching<'_, T, D>| one.touch.energy(&one.y) * T::lit(one.point.area);
-        (self.response == Response::Pressure).then(|| Ok(summed(self.touching(dphi).into_iter().map(energy))))
+        let energy = |one: ContactPoint<'_, T, D>| one.law.energy(&one.y) * T::lit(one.point.area);
+        (self.response == Response::Pressure).then(|| Ok(summed(self.contact_points(dphi).into_iter().map(energy))))
     }
 
     fn add_magnitudes_at_nodes(&self, dphi: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
-        for Touching { point, pose, touch, y, .. } in self.touching(dphi) {
-            let force = pose.rotation * touch.traction(self.response, &y) * point.area;
+        for ContactPoint { point, pose, law, y, .. } in self.contact_points(dphi) {
+            let force = pose.rotation * law.traction(self.response, &y) * point.area;
             for (node, n, _) in self.step.supports.of(point.particle) {
                 out[node] += force.abs() * n.abs();
             }
@@ -108,14 +108,14 @@ impl<const D: usize, L: Law> Term<D> for Contact<'_, D, L> {
     }
 }
 
-impl<const D: usize, L: Law> Contact<'_, D, L> {
+impl<const D: usize, L: Law> ObstacleForce<'_, D, L> {
     fn linearized(&self, dphi: &[Vector<f64, D>]) -> Vec<LinearizedPoint<D>> {
-        let linearize = |Touching { point, pose: Pose { rotation, .. }, touch, y, .. }: Touching<'_, f64, D>| {
-            let tangent = rotation * touch.tangent(self.response, &y) * rotation.transpose() * point.area;
-            mutant!("contact: the tangent does not turn with the obstacle": tangent = touch.tangent(self.response, &y) * point.area);
+        let linearize = |ContactPoint { point, pose: Pose { rotation, .. }, law, y, .. }: ContactPoint<'_, f64, D>| {
+            let tangent = rotation * law.tangent(self.response, &y) * rotation.transpose() * point.area;
+            mutant!("contact: the tangent does not turn with the obstacle": tangent = law.tangent(self.response, &y) * point.area);
             LinearizedPoint { particle: point.particle, tangent }
         };
-        self.touching(dphi).into_iter().map(linearize).collect()
+        self.contact_points(dphi).into_iter().map(linearize).collect()
     }
 }
 

@@ -56,14 +56,11 @@ pub(super) fn patch() -> Result<Report, StudyError> {
 /// A rigid cylinder pressed into a wide block, half of it between planes of symmetry: p₀ = √(F E*/(π R)) and a = √(4 F R/(π E*)).
 pub(super) fn hertz() -> Result<Report, StudyError> {
     let mut report = Report::new("Hertz, line contact: errors", &["cells over the contact", "quantity"]);
-    let (radius, half) = (10.0, 0.5);
-    for cells in [10, 20] {
-        let h = 2.0 * half / f64::from(cells);
-        let side = (12.0 * half / h).ceil() * h;
-        // The approach is that of the half width a in a half-space; the force follows from the computed contact.
-        let approach = half * half / radius;
+    let (radius, approach) = (10.0, 0.025);
+    for h in [0.074_f64, 0.037] {
+        let side = (6.0 / h).ceil() * h;
         let scene = json!({
-            "grid": { "size": [side, side + 2.0 * h], "spacing": h },
+            "grid": { "size": [side + 2.0 * h, side + 2.0 * h], "spacing": h },
             "time": { "step": 0.25, "end": 1, "scheme": "none" },
             "bodies": [{ "name": "block", "density": 1, "shape": { "box": { "min": [0, 0], "max": [side, side] } },
                          "material": { "neo_hookean": { "young": YOUNG, "poisson": POISSON } } }],
@@ -81,11 +78,14 @@ pub(super) fn hertz() -> Result<Report, StudyError> {
         let force = 2.0 * contact.force[1].abs();
         let modulus = bfree::material::p_wave_modulus(&simulation.bodies[0].law);
         let pressure = 10.0 * modulus / h * contact.depth;
-        let name = cells.to_string();
-        report.push(&[&name, "largest pressure"], (pressure / (force * PLANE / (PI * radius)).sqrt() - 1.0).abs(), Bound::AtMost(0.03));
         let width = (4.0 * force * radius / (PI * PLANE)).sqrt();
-        report.push(&[&name, "half width"], (contact.area / width - 1.0).abs(), Bound::AtMost(0.5 * h / width + 0.03));
+        let largest = (force * PLANE / (PI * radius)).sqrt();
+        let cells = format!("{:.0}", 2.0 * width / h);
+        report.push(&[&cells, "largest pressure"], (pressure / largest - 1.0).abs(), Bound::AtMost(0.03));
+        // The area is a sum over points, each half a cell wide.
+        let resolution = 0.5 * h / width;
+        report.push(&[&cells, "half width"], (contact.area / width - 1.0).abs(), Bound::AtMost(0.03 + resolution));
     }
-    report.note("The half width is a sum of the points' areas, each half a cell wide: its bound has half a point more.");
+    report.note("Bound: 3 % at 20 cells by issue 39 of the project. The bound of the half width has one point more.");
     Ok(report)
 }
