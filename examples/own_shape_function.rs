@@ -75,6 +75,7 @@ fn stretched(lame: Lame) -> Simulation<1, Material, Mixed> {
         law: NeoHookean::ciarlet(lame).into(),
         density: DENSITY,
         dilatation: Default::default(),
+        field: 0,
     }];
     Simulation {
         settings: Settings { lumping: 0.02, ..Settings::default() },

@@ -36,7 +36,7 @@ pub fn square() -> Result<Simulation<2>, Box<dyn Error>> {
         motion: [None, Some(Motion::Rest)],
     };
     let gravity = Gravity { acceleration: Vector::from([0.0, GRAVITY]), curve: Curve::constant(1.0) };
-    let bodies = vec![Body { name: "square".into(), law, density: DENSITY, dilatation: Default::default() }];
+    let bodies = vec![Body { name: "square".into(), law, density: DENSITY, dilatation: Default::default(), field: 0 }];
     let mut simulation = Simulation {
         loads: Loads { gravity: Some(gravity), prescribed: vec![floor], ..Loads::default() },
         settings: Settings {

@@ -105,6 +105,28 @@ impl<const D: usize> Grid<D> {
         (0..D).rev().fold(0, |id, k| id * (u64::from(self.cells[k]) + 1) + u64::from(index[k]))
     }
 
+    /// Number of a node in one of several nodal fields on this grid. [`Self::index`] is the same in all fields.
+    ///
+    /// ```
+    /// use bfree::grid::Grid;
+    /// use bfree::tensor::Vector;
+    ///
+    /// let grid = Grid { origin: Vector::from([0.0, 0.0]), spacing: 0.5, cells: [4, 2] };
+    /// let (first, second) = (grid.id([3, 2]), grid.id_in(1, [3, 2]));
+    /// assert_eq!((grid.field(first), grid.field(second)), (0, 1));
+    /// assert_eq!((grid.index(first), grid.index(second)), ([3, 2], [3, 2]));
+    /// ```
+    #[inline]
+    pub fn id_in(&self, field: u32, index: [u32; D]) -> u64 {
+        // Most scenes have one field.
+        if field == 0 { self.id(index) } else { u64::from(field) * self.node_count() + self.id(index) }
+    }
+
+    /// The nodal field of the node numbered `id`.
+    pub fn field(&self, id: u64) -> u32 {
+        (id / self.node_count()) as u32
+    }
+
     /// Index along each axis of the node numbered `id`.
     #[inline]
     pub fn index(&self, id: u64) -> [u32; D] {

@@ -30,6 +30,8 @@ pub struct Body<L> {
     pub density: f64,
     /// The change of volume in its energy. For a law without [`Law::volumetric`] it is always pointwise.
     pub dilatation: Dilatation,
+    /// The nodal field in which the body moves, from 0. Bodies of one field stick to each other where they share nodes.
+    pub field: u32,
 }
 
 impl<L: Law> Body<L> {

@@ -79,6 +79,19 @@ impl Extension {
         extension
     }
 
+    /// The extension of several parts that share no nodes, in ascending order: each with the number of its first node.
+    pub(crate) fn joined(degree: u32, parts: impl Iterator<Item = (usize, Self)>) -> Self {
+        let mut all = Self { degree, starts: vec![0], ..Self::default() };
+        for (first, part) in parts {
+            let (first, rows) = (first as u32, all.leaders.len() as u32);
+            all.outer.extend(part.outer.iter().map(|outer| first + outer));
+            all.starts.extend(part.starts.iter().skip(1).map(|start| rows + start));
+            all.leaders.extend(part.leaders.iter().map(|leader| first + leader));
+            all.weights.extend(part.weights);
+        }
+        all
+    }
+
     /// The degree of the functions, 1 to 3.
     pub fn degree(&self) -> u32 {
         self.degree

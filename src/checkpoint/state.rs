@@ -2,7 +2,7 @@
 
 use super::container::Arrays;
 use crate::clock::Reached;
-use crate::mechanics::loads::{Loads, Obstacle, Obstacles, Reaction};
+use crate::mechanics::loads::{Contacts, Loads, Obstacle, Reaction};
 use crate::mechanics::path::Path;
 use crate::mechanics::reference::LastEquilibrium;
 use crate::mechanics::transfer::Nodal;
@@ -66,7 +66,7 @@ pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) 
         ("external_work", std::slice::from_ref(external_work).into()),
         ("dissipated", std::slice::from_ref(dissipated).into()),
         ("path", vec![*load, *increment, *speed, *weight].into()),
-        ("obstacles", obstacle_state(&loads.obstacles).into()),
+        ("contacts", contact_state(&loads.contacts).into()),
     ];
     if let Some(Configuration { position, displacement_gradient, dilatation }) = reference {
         arrays.extend([
@@ -95,23 +95,35 @@ pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) 
     arrays
 }
 
-/// Work, friction loss and anchors of every obstacle.
-fn obstacle_state<const D: usize>(obstacles: &Obstacles<D>) -> Vec<f64> {
+/// Work, friction loss and anchors of every obstacle; stored energy, friction losses and slips between bodies.
+fn contact_state<const D: usize>(contacts: &Contacts<D>) -> Vec<f64> {
     let of = |one: &Obstacle<D>| {
         [one.work, one.friction_loss].into_iter().chain(one.anchors.iter().flatten().copied()).collect::<Vec<_>>()
     };
-    obstacles.list.iter().flat_map(of).collect()
+    let mut all: Vec<f64> = contacts.obstacles.iter().flat_map(of).collect();
+    if let Some(between) = &contacts.between {
+        all.push(between.energy);
+        all.extend(between.pairs.iter().map(|pair| pair.friction_loss));
+        all.extend(between.slips.iter().flatten());
+    }
+    all
 }
 
-/// Sets work, friction loss and anchors of every obstacle. The length of `numbers` fits.
-fn set_obstacle_state<const D: usize>(obstacles: &mut Obstacles<D>, mut numbers: &[f64]) {
-    for one in &mut obstacles.list {
+/// Sets what [`contact_state`] returns. The length of `numbers` fits.
+fn set_contact_state<const D: usize>(contacts: &mut Contacts<D>, mut numbers: &[f64]) {
+    for one in &mut contacts.obstacles {
         let [work, friction_loss, rest @ ..] = numbers else { return };
         (one.work, one.friction_loss) = (*work, *friction_loss);
         let anchors: &mut [f64] = bytemuck::cast_slice_mut(&mut one.anchors);
         let (own, others) = rest.split_at(anchors.len().min(rest.len()));
         anchors.copy_from_slice(own);
         numbers = others;
+    }
+    if let (Some(between), [energy, rest @ ..]) = (&mut contacts.between, numbers) {
+        between.energy = *energy;
+        let (losses, slips) = rest.split_at(between.pairs.len().min(rest.len()));
+        between.pairs.iter_mut().zip(losses).for_each(|(pair, loss)| pair.friction_loss = *loss);
+        between.slips.iter_mut().flatten().zip(slips).for_each(|(slip, number)| *slip = *number);
     }
 }
 
@@ -228,7 +240,7 @@ pub(super) fn restore<const D: usize, L, A>(
     }
     let clock = simulation.clock.at(reached).ok_or("a time that the clock cannot show")?;
     let mut loads = simulation.loads.clone();
-    set_obstacle_state(&mut loads.obstacles, &arrays["obstacles"]);
+    set_contact_state(&mut loads.contacts, &arrays["contacts"]);
     mutant!("checkpoint: the anchors of friction are forgotten": loads = simulation.loads.clone());
     let equilibrium = equilibrium(arrays, count, &loads)?;
     simulation.clock = clock;

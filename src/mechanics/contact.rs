@@ -1,6 +1,8 @@
-//! The law of contact between a point of a surface and a rigid obstacle: a one-sided penalty, and Coulomb friction with an elastic slip.
+//! The law of contact between a point of a surface and an obstacle or another body: a one-sided penalty, and Coulomb friction with an
+//! elastic slip.
 //!
-//! All vectors are in the frame of the obstacle, where the obstacle rests. With the gap g < 0, the normal n = ∇g, the position y of the
+//! All vectors are in the frame of the obstacle, where the obstacle rests. The surface of another body counts as a plane through the
+//! projection of the point, and all vectors are relative to the material there. With the gap g < 0, the normal n = ∇g, the position y of the
 //! point and its anchor a, the traction on the body per reference area is
 //!
 //! - pressure: p n with p = −k g
@@ -11,7 +13,8 @@
 //! The smallest elastic slip is a small part of the grid spacing. This slip does not depend on the pressure, so Newton's method also finds
 //! the points that stick under small pressures.
 
-use crate::mechanics::loads::{Obstacles, Pose, SurfacePoint};
+use crate::mechanics::loads::{BodyContact, Contacts, Facing, Partner, Pose, SurfacePoint};
+use crate::mechanics::sweep::Supports;
 use crate::scalar::Real;
 use crate::shape::{Distance, Feature};
 use crate::tensor::{Tensor, Vector, identity, outer};
@@ -29,10 +32,10 @@ enum State {
     Slip,
 }
 
-/// The law of contact at one point that touches an obstacle.
+/// The law of contact at one point.
 #[derive(Clone, Debug)]
 pub(crate) struct ContactLaw<const D: usize> {
-    /// The surface of the obstacle at the point.
+    /// The surface of the obstacle or of the other body at the point.
     feature: Feature<D>,
     /// k
     stiffness: f64,
@@ -44,59 +47,176 @@ pub(crate) struct ContactLaw<const D: usize> {
     anchor: Vector<f64, D>,
 }
 
-/// A point that touches an obstacle.
-pub(crate) struct ContactPoint<'a, T, const D: usize> {
-    /// The number of the obstacle.
-    pub obstacle: usize,
-    /// The number of the point in [`Obstacles::points`].
+/// What a point touches.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Touching {
+    /// An obstacle, by its number.
+    Obstacle(usize),
+    /// Another body.
+    Pair {
+        /// The number of the pair.
+        pair: usize,
+        /// Whether the point belongs to the first body of the pair.
+        is_first: bool,
+    },
+}
+
+/// A place at a fixed offset from a particle, in the configuration of the last grid reset, and its share of a relative position.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Carrier<const D: usize> {
+    pub particle: usize,
+    pub share: f64,
+    pub offset: Vector<f64, D>,
+}
+
+/// A point of a surface that touches an obstacle or another body.
+pub(crate) struct ContactPoint<T, const D: usize> {
+    pub touching: Touching,
+    /// The number of the point in [`Contacts::points`].
     pub number: usize,
-    /// The point.
-    pub point: &'a SurfacePoint<D>,
-    /// The pose of the obstacle.
+    /// The reference area that the point stands for. Both bodies of a pair have points, each for half its area.
+    pub area: f64,
+    /// The places whose positions, times their shares, sum to the position of the point; relative to the other body, where it touches one.
+    pub carriers: Vec<Carrier<D>>,
+    /// The pose of the obstacle. A pair has the frame of space.
     pub pose: Pose<D>,
     /// The law there.
     pub law: ContactLaw<D>,
-    /// The position of the point in the frame of the obstacle.
+    /// The position of the point in the frame of the obstacle, or relative to the place on the other body.
     pub y: Vector<T, D>,
 }
 
-/// All points that touch an obstacle at time `t`. `position` and `stiffness` (pressure per depth) are functions of the particle. `spacing` is
-/// that of the grid.
-pub(crate) fn contact_points<'a, T: Real, const D: usize>(
-    Obstacles { points, list }: &'a Obstacles<D>,
-    t: f64,
-    spacing: f64,
-    stiffness: impl Fn(usize) -> f64,
-    position: impl Fn(usize) -> Vector<T, D>,
-) -> Vec<ContactPoint<'a, T, D>> {
-    let poses: Vec<Pose<D>> = list.iter().map(|obstacle| obstacle.pose(t)).collect();
+/// What the search for contact needs beside the contacts: the penalty stiffness of a particle's body (pressure per depth), and the position
+/// of a carrier.
+pub(crate) struct Surroundings<S, P> {
+    pub t: f64,
+    pub spacing: f64,
+    pub stiffness: S,
+    pub position: P,
+}
+
+/// All points that touch an obstacle.
+pub(crate) fn obstacle_points<T: Real, const D: usize>(
+    Contacts { points, obstacles, .. }: &Contacts<D>,
+    Surroundings { t, spacing, stiffness, position }: &Surroundings<
+        impl Fn(usize) -> f64,
+        impl Fn(&Carrier<D>) -> Vector<T, D>,
+    >,
+) -> Vec<ContactPoint<T, D>> {
+    let poses: Vec<Pose<D>> = obstacles.iter().map(|obstacle| obstacle.pose(*t)).collect();
     let mut found = Vec::new();
-    for (number, point) in points.iter().enumerate() {
-        let x = position(point.particle);
-        for (index, (obstacle, pose)) in list.iter().zip(&poses).enumerate() {
+    for (number, &SurfacePoint { particle, area, .. }) in points.iter().enumerate().filter(|_| !obstacles.is_empty()) {
+        let carrier = Carrier::at(particle);
+        let x = position(&carrier);
+        for (index, (obstacle, pose)) in obstacles.iter().zip(&poses).enumerate() {
             let y = pose.rotation.map(T::lit).tr_mul(&(x - pose.shift.map(T::lit)));
             let at = y.map(T::value);
             // NaN touches nothing.
             if obstacle.shape.signed_distance(&at) < 0.0 {
                 let law = ContactLaw {
                     feature: obstacle.shape.feature(&at),
-                    stiffness: obstacle.stiffness * stiffness(point.particle),
+                    stiffness: obstacle.stiffness * stiffness(particle),
                     friction: obstacle.friction,
                     elastic_slip: ELASTIC_SLIP * spacing,
                     anchor: obstacle.anchors.get(number).copied().unwrap_or(at),
                 };
-                found.push(ContactPoint { obstacle: index, number, point, pose: *pose, law, y });
+                let touching = Touching::Obstacle(index);
+                found.push(ContactPoint { touching, number, area, carriers: vec![carrier], pose: *pose, law, y });
             }
         }
     }
     found
 }
 
-impl<const D: usize> ContactPoint<'_, f64, D> {
-    /// The force on the body.
+/// All points that touch another body.
+pub(crate) fn pair_points<T: Real, const D: usize>(
+    contacts: &Contacts<D>,
+    around: &Surroundings<impl Fn(usize) -> f64, impl Fn(&Carrier<D>) -> Vector<T, D>>,
+) -> Vec<ContactPoint<T, D>> {
+    let facing = contacts.between.iter().flat_map(|between| between.facing.iter().map(move |one| (between, one)));
+    facing.filter_map(|(between, one)| pair_point(contacts, between, one, around)).collect()
+}
+
+/// The contact of a point that faces another body; `None` without contact.
+fn pair_point<T: Real, const D: usize>(
+    contacts: &Contacts<D>,
+    between: &BodyContact<D>,
+    one: &Facing<D>,
+    Surroundings { spacing, stiffness, position, .. }: &Surroundings<
+        impl Fn(usize) -> f64,
+        impl Fn(&Carrier<D>) -> Vector<T, D>,
+    >,
+) -> Option<ContactPoint<T, D>> {
+    let carriers = one.carriers(contacts);
+    let y: Vector<T, D> =
+        carriers.iter().fold(Vector::zeros(), |y, carrier| y + position(carrier) * T::lit(carrier.share));
+    // NaN touches nothing.
+    if !(one.normal.dot(&y.map(T::value)) < 0.0) {
+        return None;
+    }
+    let softer = carriers.iter().map(|carrier| stiffness(carrier.particle)).fold(f64::INFINITY, f64::min);
+    let slip = between.slips.get(one.number).copied().unwrap_or_else(Vector::zeros);
+    let law = ContactLaw {
+        feature: Feature::Plane { point: Vector::zeros(), normal: one.normal },
+        stiffness: between.stiffness * softer,
+        friction: between.friction,
+        elastic_slip: ELASTIC_SLIP * spacing,
+        // The slip is y − a along the surface.
+        anchor: one.start - slip,
+    };
+    mutant!("contact: bodies forget their slip": law.anchor = one.start);
+    Some(ContactPoint {
+        touching: Touching::Pair { pair: one.pair, is_first: one.is_first },
+        number: one.number,
+        area: 0.5 * contacts.points[one.number].area,
+        carriers,
+        pose: Pose { rotation: identity(), shift: Vector::zeros() },
+        law,
+        y,
+    })
+}
+
+impl<const D: usize> Carrier<D> {
+    /// The particle itself.
+    pub fn at(particle: usize) -> Self {
+        Self { particle, share: 1.0, offset: Vector::zeros() }
+    }
+
+    /// The position after the nodal motion `phi` since the last grid reset.
+    pub fn position<T: Real>(
+        &self,
+        reference: &[Vector<f64, D>],
+        supports: &Supports<D>,
+        phi: &[Vector<T, D>],
+    ) -> Vector<T, D> {
+        let start = (reference[self.particle] + self.offset).map(T::lit);
+        self.weights(supports).fold(start, |x, (node, n)| x + phi[node] * T::lit(n))
+    }
+
+    /// The nodes that move the place, and their functions there: N + ∇N·offset.
+    pub fn weights<'a>(&'a self, supports: &'a Supports<D>) -> impl Iterator<Item = (usize, f64)> + 'a {
+        supports.of(self.particle).map(|(node, n, grad_n)| (node, n + grad_n.dot(&self.offset)))
+    }
+}
+
+impl<const D: usize> Facing<D> {
+    /// The point, and its projection with negative shares.
+    pub(crate) fn carriers(&self, contacts: &Contacts<D>) -> Vec<Carrier<D>> {
+        let particle = |number: usize| contacts.points[number].particle;
+        let of = |&Partner { number, share, offset }: &Partner<D>| {
+            mutant!("contact: the other body has no reaction": { return Carrier { particle: particle(number), share: 0.0, offset }; });
+            mutant!("contact: the reaction acts beside the point": { return Carrier { particle: particle(number), share: -share, offset: Vector::zeros() }; });
+            Carrier { particle: particle(number), share: -share, offset }
+        };
+        std::iter::once(Carrier::at(particle(self.number))).chain(self.partners.iter().map(of)).collect()
+    }
+}
+
+impl<const D: usize> ContactPoint<f64, D> {
+    /// The force on the body of the point.
     pub fn force(&self) -> Vector<f64, D> {
         let traction = self.law.traction(Response::Pressure, &self.y) + self.law.traction(Response::Friction, &self.y);
-        self.pose.rotation * traction * self.point.area
+        self.pose.rotation * traction * self.area
     }
 }
 
@@ -185,7 +305,13 @@ impl<const D: usize> ContactLaw<D> {
         if length <= elastic { self.anchor } else { y - slip * (elastic / length) }
     }
 
-    /// −g, the depth of the point in the obstacle.
+    /// The part of a vector along the surface, which is a plane between bodies.
+    pub fn along(&self, v: &Vector<f64, D>) -> Vector<f64, D> {
+        let normal = self.feature.at(v).normal;
+        v - normal * normal.dot(v)
+    }
+
+    /// −g, the depth of the point in the obstacle or in the other body.
     pub fn depth(&self, y: &Vector<f64, D>) -> f64 {
         -self.feature.at(y).distance
     }

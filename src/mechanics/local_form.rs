@@ -4,7 +4,6 @@ use crate::lanes::LANES;
 use crate::mechanics::sweep::{At, Group};
 use crate::mechanics::tangent::Tangent;
 use crate::mechanics::terms::Along;
-use crate::mechanics::unknowns::padded;
 use crate::solver::LocalForm;
 use crate::tensor::{Tensor, Vector};
 use std::collections::HashMap;
@@ -35,12 +34,11 @@ impl<const D: usize> Tangent<'_, D> {
 
     /// The form without tangent moduli: nodes, occupied cells, and masses. Also the cells of the particles of every group.
     pub(super) fn occupied_cells(&self) -> (LocalForm, Vec<[Option<usize>; LANES]>) {
-        let grid = self.supports.grid();
         let mut form = LocalForm {
-            grid: std::array::from_fn(|k| if k < D { grid.cells[k] } else { 0 }),
+            grid: self.supports.lattice_cells(),
             aggregated: self.supports.extension().is_some(),
             degree: self.supports.extension().map_or(0, |extension| extension.degree()),
-            nodes: self.indices(),
+            nodes: self.supports.lattice_nodes(),
             prescribed: self.unknowns.prescribed_mask(self.supports.nodes()),
             follows: self.unknowns.following_mask(self.supports.nodes()),
             ..LocalForm::default()
@@ -76,7 +74,7 @@ impl<const D: usize> Tangent<'_, D> {
     fn cells_of(
         &self,
         group: Group<'_>,
-        places: &mut HashMap<[u32; D], usize>,
+        places: &mut HashMap<[u32; 3], usize>,
         form: &mut LocalForm,
     ) -> [Option<usize>; LANES] {
         let (grid, reference) = (self.supports.grid(), self.particles.reference());
@@ -85,9 +83,10 @@ impl<const D: usize> Tangent<'_, D> {
         let solid = cells.iter_mut().zip(group.particles).filter(|(_, p)| self.particles.is_solid(**p as usize));
         for (of, &p) in solid {
             let x = &reference.position[p as usize];
-            let at = grid.cell(x).unwrap_or([0; D]);
+            let within = grid.cell(x).unwrap_or([0; D]);
+            let at = self.supports.in_lattice(self.supports.field_of(self.particles.body[p as usize]), within);
             let cell = *places.entry(at).or_insert_with(|| {
-                form.push_cell(padded(at), D.pow(4));
+                form.push_cell(at, D.pow(4));
                 form.cells.len() - 1
             });
             let share = reference.volume(p as usize) / volume;
@@ -95,28 +94,26 @@ impl<const D: usize> Tangent<'_, D> {
             form.filled[cell] += share;
             for k in 0..D {
                 let local = (x[k] - grid.origin[k]) / grid.spacing;
-                form.centres[cell][k] += share * local;
+                form.centres[cell][k] += share * (local + f64::from(at[k] - within[k]));
             }
         }
         cells
     }
 
-    /// For each node, the force at the node under uniform motions along the axes, from the terms at nodes.
+    /// For each node, the force at the node under uniform motions of its nodal field along the axes, from the terms at nodes. The other fields
+    /// rest, since contact resists relative motions.
     fn blocks_under_uniform_motion(&self) -> Vec<Tensor<f64, D>> {
         let nodes = self.supports.nodes();
         let mut blocks = vec![Tensor::<f64, D>::zeros(); nodes];
-        for k in 0..D {
-            let uniform = vec![Vector::<f64, D>::from_fn(|i, _| if i == k { 1.0 } else { 0.0 }); nodes];
+        for (field, k) in (0..self.supports.field_count()).flat_map(|field| (0..D).map(move |k| (field, k))) {
+            let moving = self.supports.nodes_of(field);
+            let mut uniform = vec![Vector::<f64, D>::zeros(); nodes];
+            uniform[moving.clone()].fill(Vector::from_fn(|i, _| if i == k { 1.0 } else { 0.0 }));
             let mut out = vec![Vector::<f64, D>::zeros(); nodes];
             self.terms.iter().for_each(|term| term.add_product_at_nodes(&uniform, &mut out));
-            blocks.iter_mut().zip(&out).for_each(|(block, out)| block.set_column(k, out));
+            blocks[moving.clone()].iter_mut().zip(&out[moving]).for_each(|(block, out)| block.set_column(k, out));
         }
         blocks
-    }
-
-    fn indices(&self) -> Vec<[u32; 3]> {
-        let (grid, active) = (self.supports.grid(), self.supports.active());
-        active.ids().iter().map(|&id| padded(grid.index(id))).collect()
     }
 }
 

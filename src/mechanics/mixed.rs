@@ -115,7 +115,7 @@ impl<const D: usize> SaddlePoint for MixedTangent<'_, D> {
     }
 
     fn cells(&self) -> PressureCells {
-        let grid = self.tangent.supports.grid();
+        let (supports, grid) = (self.tangent.supports, self.tangent.supports.grid());
         let mut all = PressureCells {
             occupied: self.tangent.occupied_cells().0,
             softness: self.softness(),
@@ -123,10 +123,11 @@ impl<const D: usize> SaddlePoint for MixedTangent<'_, D> {
             ..PressureCells::default()
         };
         for cell in self.cells() {
-            all.index.push(std::array::from_fn(|k| if k < D { cell.index[k] } else { 0 }));
-            all.centroid.push(std::array::from_fn(|k| {
-                if k < D { (cell.centroid[k] - grid.origin[k]) / grid.spacing } else { 0.0 }
-            }));
+            let index = supports.in_lattice(cell.field, cell.index);
+            let local = |k: usize| (cell.centroid[k] - grid.origin[k]) / grid.spacing;
+            let shift = |k: usize| f64::from(index[k] - cell.index[k]);
+            all.index.push(index);
+            all.centroid.push(std::array::from_fn(|k| if k < D { local(k) + shift(k) } else { 0.0 }));
             // The form takes gradients in units of 1/h.
             all.pull.extend((cell.pull / grid.spacing).iter());
             all.volume.push(cell.volume);

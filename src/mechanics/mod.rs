@@ -5,6 +5,7 @@ pub mod check;
 pub mod constitutive;
 pub(crate) mod contact;
 pub(crate) mod dilatation;
+pub(crate) mod facing;
 pub mod loads;
 mod local_form;
 pub mod mass;

@@ -22,8 +22,8 @@ pub(crate) fn unsymmetric<const D: usize, L: Law>(bodies: &[Body<L>], loads: &Lo
     if loads.surface.iter().any(|load| matches!(load.pressing, Pressing::Pressure(_))) {
         return Some("pressures that follow a surface make the tangent unsymmetric");
     }
-    if loads.obstacles.have_friction() {
-        return Some("friction at obstacles makes the tangent unsymmetric");
+    if loads.contacts.have_friction() {
+        return Some("friction makes the tangent unsymmetric");
     }
     let law = bodies.iter().any(|body| !body.law.is_symmetric());
     law.then_some("a law makes the tangent unsymmetric")

@@ -17,8 +17,20 @@ const LONGEST: f64 = 2.0;
 /// The extension E of the bodies in a grid, from the volumes of the particles at the last grid reset. A particle fills the cells that its domain overlaps.
 /// The filled share of a cell thus changes gradually as particles move into the cell. A cell that holds no particle counts as empty.
 pub(crate) fn extension<const D: usize>(pieces: Pieces, particles: &Particles<D>, supports: &Supports<D>) -> Extension {
+    let parts = (0..supports.field_count()).map(|field| of_field(field, pieces, particles, supports));
+    Extension::joined(pieces.degree, parts)
+}
+
+/// The extension of one nodal field, and the number of its first node.
+fn of_field<const D: usize>(
+    field: u32,
+    pieces: Pieces,
+    particles: &Particles<D>,
+    supports: &Supports<D>,
+) -> (usize, Extension) {
     let (grid, reference) = (supports.grid(), particles.reference());
-    let solid = || (0..particles.len()).filter(|&p| particles.is_solid(p));
+    let in_field = |p: usize| supports.field_of(particles.body[p]) == field;
+    let solid = || (0..particles.len()).filter(|&p| particles.is_solid(p) && in_field(p));
     let local = |p: usize, k: usize| grid.axis(k).local(reference.position[p][k]).unwrap_or(0.0);
     let cell = |p: usize| std::array::from_fn(|k| pieces.cell(local(p, k), grid.cells[k]));
     let mut volumes: BTreeMap<[u32; D], f64> = solid().map(|p| (cell(p), 0.0)).collect();
@@ -39,9 +51,12 @@ pub(crate) fn extension<const D: usize>(pieces: Pieces, particles: &Particles<D>
         let whole: f64 = (0..D).map(|k| grid.spacing * pieces.within(cell[k], grid.cells[k])).product();
         (padded(*cell), volume / whole)
     };
-    let nodes: Vec<[u32; 3]> = supports.active().ids().iter().map(|&id| padded(grid.index(id))).collect();
+    let range = supports.nodes_of(field);
+    let nodes: Vec<[u32; 3]> =
+        supports.active().ids()[range.clone()].iter().map(|&id| padded(grid.index(id))).collect();
     let cells = volumes.iter().map(share).collect();
-    Extension::new(pieces, &Occupied { dimension: D, grid: padded(grid.cells), nodes: &nodes, cells })
+    let occupied = Occupied { dimension: D, grid: padded(grid.cells), nodes: &nodes, cells };
+    (range.start, Extension::new(pieces, &occupied))
 }
 
 /// The index with zeros for axes that do not exist.

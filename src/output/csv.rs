@@ -15,6 +15,12 @@ pub(crate) fn cell(number: impl std::fmt::Debug) -> String {
     format!("{number:?}")
 }
 
+/// A name as a cell, in quotes where it has commas, quotes or line breaks (RFC 4180).
+pub(crate) fn text(name: &str) -> String {
+    let quoted = name.contains([',', '"', '\n', '\r']);
+    if quoted { format!("\"{}\"", name.replace('"', "\"\"")) } else { name.to_owned() }
+}
+
 /// A table on disk.
 #[derive(Debug)]
 pub(crate) struct Table(pub(crate) Stream);

@@ -1,12 +1,12 @@
-//! The rows of every step in `history.csv`, with energies, momentum and iterations, in `reactions.csv` and in `obstacles.csv`.
+//! The rows of every step in `history.csv`, with energies, momentum and iterations, in `reactions.csv`, `obstacles.csv` and `contacts.csv`.
 
 use super::Reference;
-use super::csv::{Row, cell};
+use super::csv::{Row, cell, text};
 use super::fields::padded;
 use crate::approximation::ShapeFunction;
 use crate::material::{DISSIPATED, Law, PLASTIC_STRAIN};
 use crate::mechanics::loads::{Loads, Reaction};
-use crate::simulation::{ObstacleContact, Simulation};
+use crate::simulation::{ContactForces, Simulation};
 
 /// Axis names at the ends of column names.
 pub(crate) const AXES: [&str; 3] = ["x", "y", "z"];
@@ -20,7 +20,7 @@ pub struct Energies {
     pub strain: f64,
     /// Work of gravity, tractions, pressure, moving walls and moving obstacles since the start.
     pub external: f64,
-    /// The energy stored in the contact with obstacles.
+    /// The energy stored in contact.
     pub contact: f64,
     /// Kinetic, strain and contact energy.
     pub total: f64,
@@ -28,7 +28,7 @@ pub struct Energies {
     pub dissipated: f64,
     /// The part of `dissipated` due to plastic flow and relaxation.
     pub by_laws: f64,
-    /// The part of `dissipated` due to friction at obstacles.
+    /// The part of `dissipated` due to friction of contact.
     pub friction: f64,
     /// total₀ + dissipated₀ − external₀ when the reference was taken, see [`Reference::energy`].
     pub initial: f64,
@@ -63,7 +63,7 @@ impl Energies {
         let (kinetic, strain) = (simulation.particles.kinetic_energy(), simulation.strain_energy());
         let by_laws = simulation.dissipated_by_laws();
         let dissipated = simulation.dissipated + by_laws;
-        let friction = simulation.loads.obstacles.list.iter().fold(0.0, |sum, obstacle| sum + obstacle.friction_loss);
+        let friction = simulation.loads.contacts.friction_loss();
         let contact = simulation.contact_energy();
         let (external, total, initial) = (simulation.external_work, kinetic + strain + contact, reference.energy);
         let balance = total + dissipated - initial - external;
@@ -89,9 +89,9 @@ pub(crate) struct Cost {
 pub(crate) fn row<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, energies: &Energies, cost: Cost) -> Row {
     let Energies { kinetic, strain, external, contact, dissipated, friction, total, balance, .. } = *energies;
     let scheme = &simulation.settings.scheme;
-    let obstacles = &simulation.loads.obstacles;
+    let contacts = &simulation.loads.contacts;
     let dissipates =
-        simulation.loads.damping.is_some() || obstacles.have_friction() || simulation.has_internal_variable(DISSIPATED);
+        simulation.loads.damping.is_some() || contacts.have_friction() || simulation.has_internal_variable(DISSIPATED);
     let momentum = padded(&simulation.particles.momentum());
     let columns = [
         (true, "step", cell(simulation.clock.steps())),
@@ -101,9 +101,9 @@ pub(crate) fn row<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, e
         (true, "kinetic", cell(kinetic)),
         (true, "strain", cell(strain)),
         (true, "external", cell(external)),
-        (!obstacles.list.is_empty(), "contact", cell(contact)),
+        (contacts.exist(), "contact", cell(contact)),
         (dissipates, "dissipated", cell(dissipated)),
-        (obstacles.have_friction(), "friction", cell(friction)),
+        (contacts.have_friction(), "friction", cell(friction)),
         (true, "total", cell(total)),
         (scheme.has_inertia(), "balance", cell(balance)),
         (true, "momentum_x", cell(momentum[0])),
@@ -130,22 +130,37 @@ pub(crate) fn reactions<const D: usize>(time: f64, loads: &Loads<D>, reactions: 
 
 /// The row of a step that ended at `time` in `obstacles.csv`. Columns begin with the name of the obstacle: the force and the moment on the
 /// obstacle, the area of contact, the largest depth, and the work and the friction loss since the start.
-pub(crate) fn obstacles<const D: usize>(time: f64, loads: &Loads<D>, contacts: &[ObstacleContact<D>]) -> Row {
+pub(crate) fn obstacles<const D: usize>(time: f64, loads: &Loads<D>, contacts: &[ContactForces<D>]) -> Row {
     let mut row = vec![("time".to_owned(), cell(time))];
-    for (obstacle, contact) in loads.obstacles.list.iter().zip(contacts) {
-        let mut add = |what: &str, x: f64| row.push((format!("{}_{what}", obstacle.name), cell(x)));
-        AXES.iter().zip(&contact.force).for_each(|(axis, force)| add(axis, *force));
-        match D {
-            1 => {}
-            2 => add("moment", contact.moment[2]),
-            _ => AXES.iter().zip(contact.moment).for_each(|(axis, moment)| add(&format!("moment_{axis}"), moment)),
-        }
-        add("area", contact.area);
-        add("depth", contact.depth);
-        add("work", contact.work);
+    for (obstacle, contact) in loads.contacts.obstacles.iter().zip(contacts) {
+        add_contact(&mut row, &format!("{}_", obstacle.name), contact);
+        row.push((format!("{}_work", obstacle.name), cell(contact.work)));
         if obstacle.friction > 0.0 {
-            add("friction_loss", contact.friction_loss);
+            row.push((format!("{}_friction_loss", obstacle.name), cell(contact.friction_loss)));
         }
     }
     row
+}
+
+/// The row of a pair of bodies in `contacts.csv`, for a step that ended at `time`: the force and the moment on the second body, the area, the
+/// largest depth, and the friction loss since the start.
+pub(crate) fn pair<const D: usize>(time: f64, names: [&str; 2], contact: &ContactForces<D>) -> Row {
+    let mut row = vec![("time".to_owned(), cell(time))];
+    row.extend(["first", "second"].into_iter().zip(names).map(|(which, name)| (which.to_owned(), text(name))));
+    add_contact(&mut row, "", contact);
+    row.push(("friction_loss".to_owned(), cell(contact.friction_loss)));
+    row
+}
+
+/// Adds force, moment, area and depth of a contact.
+fn add_contact<const D: usize>(row: &mut Row, prefix: &str, contact: &ContactForces<D>) {
+    let mut add = |what: &str, x: f64| row.push((format!("{prefix}{what}"), cell(x)));
+    AXES.iter().zip(&contact.force).for_each(|(axis, force)| add(axis, *force));
+    match D {
+        1 => {}
+        2 => add("moment", contact.moment[2]),
+        _ => AXES.iter().zip(contact.moment).for_each(|(axis, moment)| add(&format!("moment_{axis}"), moment)),
+    }
+    add("area", contact.area);
+    add("depth", contact.depth);
 }

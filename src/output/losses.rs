@@ -22,8 +22,8 @@ impl Cause {
     const ALL: [Self; 5] = [Self::Obstacle, Self::Wall, Self::Bodies, Self::NewGrid, Self::Step];
 
     /// The cause of losses in a step.
-    pub fn of(touches_obstacle: bool, feels_wall: bool, shares: bool, renewed: bool) -> Self {
-        match (touches_obstacle, feels_wall, shares, renewed) {
+    pub fn of(touches: bool, feels_wall: bool, shares: bool, renewed: bool) -> Self {
+        match (touches, feels_wall, shares, renewed) {
             (true, ..) => Self::Obstacle,
             (_, true, ..) => Self::Wall,
             (.., true, _) => Self::Bodies,

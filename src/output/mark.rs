@@ -50,6 +50,8 @@ pub struct Mark {
     pub(super) snapshots: Option<SnapshotMark>,
     pub(super) watch: Watch,
     pub(super) touched: Vec<Touched>,
+    /// Pairs of bodies that touched so far.
+    pub(super) touched_pairs: Vec<Touched>,
     pub(super) counts: Counts,
     pub(super) seconds: Seconds,
 }

@@ -6,6 +6,7 @@
 //! |---|---|
 //! | `history.csv` | energies, momentum, Newton and Krylov iterations of every step |
 //! | `reactions.csv` | force of every prescribed condition on the bodies, torque of rotations, if there are any |
+//! | `contacts.csv` | force, moment, area and depth of contact, and friction loss of every pair of bodies in contact, if bodies may touch |
 //! | `obstacles.csv` | force, moment, area and depth of contact, work and friction loss of every obstacle, if there are any |
 //! | `probes.csv` | fields at chosen particles or points, if any are asked for |
 //! | `particles.pvd`, `particles_*.vtu` | snapshots of the particles for ParaView |

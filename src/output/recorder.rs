@@ -18,7 +18,7 @@ use crate::approximation::ShapeFunction;
 use crate::field::Field;
 use crate::material::Law;
 use crate::mechanics::loads::Reaction;
-use crate::simulation::{ObstacleContact, Simulation, StepReport};
+use crate::simulation::{ContactForces, Simulation, StepReport};
 use serde_json::{Map, Value};
 use std::path::PathBuf;
 use std::time::Instant;
@@ -63,6 +63,7 @@ pub struct Recorder<const D: usize> {
     history: Table,
     reactions: Option<Table>,
     obstacles: Option<Table>,
+    contacts: Option<Table>,
     probes: Vec<Probe<D>>,
     probed: Option<Table>,
     snapshots: Option<Snapshots>,
@@ -134,9 +135,12 @@ impl<const D: usize> Recorder<D> {
         let reactions = (!loads.prescribed.is_empty())
             .then(|| table("reactions.csv", &history::reactions(0.0, loads, &no_reactions)))
             .transpose()?;
-        let untouched = vec![ObstacleContact::NONE; loads.obstacles.list.len()];
+        let untouched = vec![ContactForces::NONE; loads.contacts.obstacles.len()];
         let obstacles = (!untouched.is_empty())
             .then(|| table("obstacles.csv", &history::obstacles(0.0, loads, &untouched)))
+            .transpose()?;
+        let contacts = (loads.contacts.between.is_some())
+            .then(|| table("contacts.csv", &history::pair(0.0, [""; 2], &ContactForces::<D>::NONE)))
             .transpose()?;
         let probed = (!probes.is_empty())
             .then(|| table("probes.csv", &probes::row(&probes, simulation, &reference)?))
@@ -148,6 +152,7 @@ impl<const D: usize> Recorder<D> {
             history,
             reactions,
             obstacles,
+            contacts,
             probes,
             probed,
             snapshots,
@@ -206,6 +211,12 @@ impl<const D: usize> Recorder<D> {
         if let Some(obstacles) = &mut self.obstacles {
             obstacles.write(&history::obstacles(time, &simulation.loads, &step.obstacles))?;
         }
+        if let Some(table) = &mut self.contacts {
+            for ([one, other], contact) in pairs(simulation).zip(&step.pairs).filter(|(_, contact)| contact.area > 0.0)
+            {
+                table.write(&history::pair(time, [one, other], contact))?;
+            }
+        }
         let newton = &step.newton.history;
         let (iterations, krylov) = (newton.iterations.len(), newton.counts.krylov_iterations);
         let cost = Cost { dt: step.dt, newton: iterations, krylov, yielding: step.yielding };
@@ -216,18 +227,36 @@ impl<const D: usize> Recorder<D> {
             step: number,
             settings,
             energies,
-            cause: Cause::of(step.touches_obstacle(), step.feels_wall, !step.sharing.is_empty(), step.reset),
+            cause: Cause::of(step.touches(), step.feels_wall, !step.sharing.is_empty(), step.reset),
             cost,
             failed: step.failed.iter().filter(|attempt| !attempt.inaccurate).count(),
             error: step.error,
             limited: attempts().map(|one| one.counts.krylov_limited).sum(),
             stagnated: attempts().map(|one| one.counts.krylov_stagnated).sum(),
         };
-        touched::see(&mut self.so_far.touched, time, &simulation.loads.obstacles, &step.obstacles);
+        let contacts = &simulation.loads.contacts;
+        let obstacles = contacts.obstacles.iter().map(|obstacle| obstacle.name.clone());
+        touched::see(&mut self.so_far.touched, time, obstacles, &step.obstacles);
+        touched::see(
+            &mut self.so_far.touched_pairs,
+            time,
+            pairs(simulation).map(|names| names.join(" and ")),
+            &step.pairs,
+        );
         let known = self.so_far.watch.warnings.len();
         self.so_far.watch.see(&seen);
-        for (obstacle, contact) in simulation.loads.obstacles.list.iter().zip(&step.obstacles) {
-            self.so_far.watch.see_depth(&seen, &obstacle.name, contact.depth / simulation.grid.spacing);
+        for (obstacle, contact) in contacts.obstacles.iter().zip(&step.obstacles) {
+            let place = format!("in the obstacle {:?}", obstacle.name);
+            self.so_far.watch.see_depth(
+                &seen,
+                &place,
+                "obstacles[].stiffness",
+                contact.depth / simulation.grid.spacing,
+            );
+        }
+        for ([one, other], contact) in pairs(simulation).zip(&step.pairs) {
+            let place = format!("in another one ({one:?}, {other:?})");
+            self.so_far.watch.see_depth(&seen, &place, "contact.stiffness", contact.depth / simulation.grid.spacing);
         }
         let names: Vec<&str> = simulation.bodies.iter().map(|body| body.name.as_str()).collect();
         self.so_far.watch.see_contact(&seen, &step.sharing, &names);
@@ -273,6 +302,7 @@ impl<const D: usize> Recorder<D> {
             seconds: self.seconds_so_far(),
             contact: self.so_far.watch.contacts,
             obstacles: self.so_far.touched,
+            pairs: self.so_far.touched_pairs,
             warnings: self.so_far.watch.warnings,
             counts: self.so_far.counts,
         };
@@ -309,7 +339,19 @@ impl<const D: usize> Recorder<D> {
 
     /// All files that grow line by line.
     fn streams(&mut self) -> impl Iterator<Item = &mut Stream> {
-        let tables = [Some(&mut self.history), self.reactions.as_mut(), self.obstacles.as_mut(), self.probed.as_mut()];
+        let tables = [
+            Some(&mut self.history),
+            self.reactions.as_mut(),
+            self.obstacles.as_mut(),
+            self.contacts.as_mut(),
+            self.probed.as_mut(),
+        ];
         std::iter::once(&mut self.newton).chain(tables.into_iter().flatten().map(|table| &mut table.0))
     }
+}
+
+/// The names of all pairs of bodies that may touch.
+fn pairs<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>) -> impl Iterator<Item = [&str; 2]> {
+    let pairs = simulation.loads.contacts.between.iter().flat_map(|between| &between.pairs);
+    pairs.map(|pair| pair.bodies.map(|body| simulation.bodies[body as usize].name.as_str()))
 }

@@ -149,6 +149,7 @@ fn head(asked: &Map<String, Value>, outcome: Outcome<'_>, summary: &Summary) -> 
         },
         "counts": summary.counts, "seconds": seconds, "warnings": summary.warnings, "contact": summary.contact,
         "obstacles": summary.obstacles,
+        "pairs": summary.pairs,
     });
     if let Outcome::Failed(error) = outcome {
         head["failed_attempts"] = json!(Attempt::failed(&error.failed));

@@ -30,6 +30,8 @@ pub struct Summary {
     pub contact: Vec<Contact>,
     /// Obstacles that bodies touched.
     pub obstacles: Vec<Touched>,
+    /// Pairs of bodies that touched.
+    pub pairs: Vec<Touched>,
     /// The warnings that were given.
     pub warnings: Vec<Warning>,
     /// Counts over all steps.
@@ -77,6 +79,9 @@ impl Display for Summary {
         }
         for touched in &self.obstacles {
             writeln!(f, "obstacle  {touched}")?;
+        }
+        for touched in &self.pairs {
+            writeln!(f, "contact   {touched}")?;
         }
         for Warning { time, step, message, .. } in &self.warnings {
             writeln!(f, "warned    t = {time}, step {step}: {message}")?;

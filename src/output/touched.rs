@@ -1,28 +1,27 @@
-//! Obstacles that bodies touched during a run, for the report.
+//! Obstacles that bodies touched during a run, and pairs of bodies that touched, for the report.
 
-use crate::mechanics::loads::Obstacles;
-use crate::simulation::ObstacleContact;
+use crate::simulation::ContactForces;
 use serde::{Deserialize, Serialize};
 
-/// An obstacle that bodies touched.
+/// An obstacle that bodies touched, or a pair of bodies that touched.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Touched {
-    /// Name of the obstacle.
-    pub obstacle: String,
+    /// Name of the obstacle, or both names of the pair.
+    pub name: String,
     /// The end of the first step with contact.
     pub since: f64,
     /// The end of the last step with contact so far.
     pub until: f64,
-    /// The force on the obstacle at the end of the last step, by component.
+    /// The force on the obstacle, or on the second body, at the end of the last step, by component.
     pub force: Vec<f64>,
     /// The largest norm of the force.
     pub largest_force: f64,
     /// The time of the largest force.
     pub largest_at: f64,
-    /// The largest depth of a point in the obstacle (length).
+    /// The largest depth of a point (length).
     pub largest_depth: f64,
-    /// The work of the moving obstacle on the bodies.
+    /// The work of the moving obstacle on the bodies; 0 for a pair.
     pub work: f64,
     /// The energy dissipated by friction.
     pub friction_loss: f64,
@@ -32,18 +31,18 @@ pub struct Touched {
 pub(crate) fn see<const D: usize>(
     touched: &mut Vec<Touched>,
     time: f64,
-    obstacles: &Obstacles<D>,
-    contacts: &[ObstacleContact<D>],
+    names: impl Iterator<Item = String>,
+    contacts: &[ContactForces<D>],
 ) {
-    for (obstacle, contact) in obstacles.list.iter().zip(contacts) {
-        let known = touched.iter().position(|one| one.obstacle == obstacle.name);
+    for (name, contact) in names.zip(contacts) {
+        let known = touched.iter().position(|one| one.name == name);
         if known.is_none() && contact.area == 0.0 {
             continue;
         }
         let at = known.unwrap_or(touched.len());
         if known.is_none() {
             touched.push(Touched {
-                obstacle: obstacle.name.clone(),
+                name,
                 since: time,
                 until: time,
                 force: Vec::new(),
@@ -69,10 +68,10 @@ pub(crate) fn see<const D: usize>(
 
 impl std::fmt::Display for Touched {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self { obstacle, since, until, largest_force, largest_at, largest_depth, work, friction_loss, .. } = self;
+        let Self { name, since, until, largest_force, largest_at, largest_depth, work, friction_loss, .. } = self;
         write!(
             f,
-            "{obstacle:?} was touched from t = {since} to {until}: largest force {largest_force:.6e} at t = {largest_at}, largest depth \
+            "{name:?} touched from t = {since} to {until}: largest force {largest_force:.6e} at t = {largest_at}, largest depth \
              {largest_depth:.3e}, work {work:.6e}, friction loss {friction_loss:.6e}"
         )
     }

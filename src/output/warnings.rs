@@ -204,12 +204,13 @@ impl Watch {
         self.usual_krylov += (krylov - usual) / self.seen.min(MEMORY) as f64;
     }
 
-    /// Warns of a body that is deep in an obstacle. `depth` is in grid spacings.
-    pub(crate) fn see_depth(&mut self, step: &Watched, obstacle: &str, depth: f64) {
+    /// Warns of a body that is deep in an obstacle or in another body. `place` says where, `key` is that of the stiffness, and `depth` is in grid
+    /// spacings.
+    pub(crate) fn see_depth(&mut self, step: &Watched, place: &str, key: &str, depth: f64) {
         if depth > DEEP {
             let text = format!(
-                "a body is {depth:.2} grid spacings deep in the obstacle {obstacle:?}, and the contact is too soft for its shape: raise \
-                 obstacles[].stiffness, or lower grid.spacing"
+                "a body is {depth:.2} grid spacings deep {place}, and the contact is too soft for its shape: raise {key}, or lower \
+                 grid.spacing"
             );
             self.warn(step, Kind::ObstacleDeep, text);
         }

@@ -99,8 +99,8 @@ impl<const D: usize, L: Law, A: ShapeFunction> Inventory<'_, D, L, A> {
         let carries_over = !self.has_inertia && self.simulation.may_reset();
         let out_of_balance = nodes * Self::VECTOR * if self.keeps_grid { 3 } else { 2 };
         let loaded: usize = loads.surface.iter().map(|load| load.points.len()).sum();
-        let points = loaded + loads.obstacles.points.len();
-        let anchors: usize = loads.obstacles.list.iter().map(|obstacle| obstacle.anchors.len()).sum();
+        let points = loaded + loads.contacts.points.len();
+        let anchors: usize = loads.contacts.obstacles.iter().map(|obstacle| obstacle.anchors.len()).sum();
         // In load steps, the points of the last equilibrium are stored, too.
         let copies = if self.has_inertia { 1 } else { 2 };
         vec![

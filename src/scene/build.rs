@@ -67,16 +67,17 @@ impl Scene {
         let approximation = self.shape_functions(&mut Problems::default()).filter(|_| problems.is_empty());
         let approximation = approximation.ok_or_else(|| BuildError::Values(std::mem::take(&mut problems)))?;
         let mut builder = Builder { scene: self, folder, memory, grid, particles: Particles::default() };
-        let mut bodies = Vec::new();
+        let (mut bodies, fields) = (Vec::new(), self.nodal_fields());
         for (i, (body, law)) in self.bodies.iter().zip(self.laws()).enumerate() {
             builder.fill(i, body)?;
             let (name, density, dilatation) = (body.name.clone(), body.density, body.volumetric);
-            bodies.push(particles::Body { name, law, density, dilatation });
+            bodies.push(particles::Body { name, law, density, dilatation, field: fields[i] });
         }
         let mut loads = builder.loads()?;
-        builder.refuse_overlap(&loads.obstacles)?;
+        builder.refuse_overlap(&loads.contacts)?;
+        builder.refuse_overlapping_bodies(&loads.contacts)?;
         let mut particles = builder.particles;
-        loads.obstacles.anchor(&particles.position, 0.0);
+        loads.contacts.anchor(&particles.position, 0.0);
         particles.set_internal_to_rest(&bodies);
         let clock = Clock::new(self.time.step, self.time.max_halvings);
         let mut simulation = Simulation {

@@ -7,8 +7,8 @@ use super::load::{Loaded, Pressure, Stress, Traction};
 use super::vector::vector;
 use super::{BuildError, Scene};
 use crate::mechanics::loads::{
-    Curve, CurveError, ForceField, Gravity, Loads, Motion, Obstacle, Obstacles, Prescribed, Pressing, Rotation,
-    Selection, SurfaceLoad, SurfacePoint,
+    BodyContact, Contacts, Curve, CurveError, ForceField, Gravity, Loads, Motion, Obstacle, Prescribed, Pressing,
+    Rotation, Selection, SurfaceLoad, SurfacePoint,
 };
 use crate::shape;
 use crate::tensor::Vector;
@@ -72,25 +72,29 @@ impl<const D: usize> Builder<'_, D> {
             };
             loads.surface.push(SurfaceLoad { pressing, curve: factor(load.curve.as_ref())?, points });
         }
-        loads.obstacles = self.obstacles()?;
+        loads.contacts = self.contacts()?;
         Ok(loads)
     }
 
-    /// The obstacles, and points on the whole surface of every body.
-    fn obstacles(&mut self) -> Result<Obstacles<D>, BuildError> {
+    /// What bodies may touch, and points on the whole surface of every body that may touch something.
+    fn contacts(&mut self) -> Result<Contacts<D>, BuildError> {
         let scene = self.scene;
-        let mut obstacles = Obstacles::default();
+        let mut contacts = Contacts::default();
         for (i, one) in scene.obstacles.iter().enumerate() {
             let path = format!("obstacles[{i}]");
             let (shape, motion) = (one.shape.built(&path)?, one.motion().motion(0)?);
-            obstacles.list.push(Obstacle::new(one.name.clone(), shape, motion, one.stiffness, one.friction));
+            contacts.obstacles.push(Obstacle::new(one.name.clone(), shape, motion, one.stiffness, one.friction));
         }
-        for (i, body) in scene.bodies.iter().enumerate().filter(|_| !scene.obstacles.is_empty()) {
+        if let Some(contact) = &scene.contact {
+            contacts.between = Some(BodyContact::new(contact.stiffness, contact.friction, &scene.nodal_fields()));
+        }
+        let exist = contacts.exist();
+        for (i, body) in scene.bodies.iter().enumerate().filter(|_| exist) {
             let whole =
                 Loaded { body: &body.name, region: &None, stress: Stress::Pressure(0.0), curve: &None, surface: &None };
-            obstacles.points.extend(self.points(&format!("bodies[{i}]"), &whole)?);
+            contacts.points.extend(self.points(&format!("bodies[{i}]"), &whole)?);
         }
-        Ok(obstacles)
+        Ok(contacts)
     }
 
     /// The body around the middle of a bounded obstacle, which may lie between particles.
@@ -106,9 +110,9 @@ impl<const D: usize> Builder<'_, D> {
     }
 
     /// Refuses bodies that start in an obstacle.
-    pub fn refuse_overlap(&self, obstacles: &Obstacles<D>) -> Result<(), BuildError> {
+    pub fn refuse_overlap(&self, Contacts { obstacles, .. }: &Contacts<D>) -> Result<(), BuildError> {
         let (particles, h) = (&self.particles, self.grid.spacing);
-        for (i, obstacle) in obstacles.list.iter().enumerate() {
+        for (i, obstacle) in obstacles.iter().enumerate() {
             let depth = |p: usize| -obstacle.shape.signed_distance(&particles.position[p]);
             let deepest = (0..particles.len()).max_by(|&a, &b| depth(a).total_cmp(&depth(b)));
             if let Some(p) = deepest.filter(|&p| depth(p) > DEEPEST_START * h) {
@@ -124,6 +128,31 @@ impl<const D: usize> Builder<'_, D> {
             if let Some(body) = self.around(&obstacle.shape) {
                 let what = format!("obstacle {:?} starts inside body {body:?}; move one of the two", obstacle.name);
                 return Err(BuildError::at(format!("obstacles[{i}]"), what));
+            }
+        }
+        Ok(())
+    }
+
+    /// Refuses bodies that start in each other, where they may touch.
+    pub fn refuse_overlapping_bodies(&self, contacts: &Contacts<D>) -> Result<(), BuildError> {
+        let (particles, h) = (&self.particles, self.grid.spacing);
+        let shapes: Vec<_> = self.scene.bodies.iter().map(|body| body.shape.as_ref()?.build::<D>()).collect();
+        for pair in contacts.between.iter().flat_map(|between| &between.pairs) {
+            let [one, other] = pair.bodies;
+            for (inner, outer) in [(one, other), (other, one)] {
+                let Some(shape) = &shapes[outer as usize] else { continue };
+                let depth = |p: usize| -shape.signed_distance(&particles.position[p]);
+                let own = (0..particles.len()).filter(|&p| particles.body[p] == inner);
+                let deepest = own.max_by(|&a, &b| depth(a).total_cmp(&depth(b)));
+                if let Some(p) = deepest.filter(|&p| depth(p) > DEEPEST_START * h) {
+                    let [inner, outer] = [inner, outer].map(|body| &self.scene.bodies[body as usize].name);
+                    let (x, depth) = (particles.position[p].as_slice(), depth(p) / h);
+                    let what = format!(
+                        "body {inner:?} starts in body {outer:?}: its point at {x:?} is {depth:.3} grid spacings deep, and {DEEPEST_START} is \
+                         allowed; move one of the two, or put both in one group of contact.groups"
+                    );
+                    return Err(BuildError::at("contact", what));
+                }
             }
         }
         Ok(())

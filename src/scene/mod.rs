@@ -7,6 +7,7 @@
 pub mod accuracy;
 pub mod body;
 pub mod boundary;
+pub mod contact;
 pub mod curve;
 pub mod grid;
 pub mod image_file;
@@ -64,8 +65,8 @@ const OF_INERTIA: [&str; 3] = ["transfer", "initial_velocity", "damping"];
 /// Keys of `time` that have a meaning only with inertia.
 const TIME_OF_INERTIA: [&str; 6] = ["beta", "gamma", "lumping", "projection", "wall_update", "adaptive"];
 
-/// The default of `time.lumping` where there are obstacles (`docs/src/obstacles.md`).
-const LUMPING_AT_OBSTACLES: f64 = 0.1;
+/// The default of `time.lumping` where bodies may touch obstacles or each other (`docs/src/obstacles.md`).
+const LUMPING_IN_CONTACT: f64 = 0.1;
 
 /// A body that comes this near to a face of the box, in spacings, touches it.
 const TOUCHES: f64 = 1e-9;
@@ -127,6 +128,8 @@ pub struct Scene {
     /// Rigid obstacles that bodies touch and leave freely.
     #[serde(default)]
     pub obstacles: Vec<obstacle::Obstacle>,
+    /// Contact between bodies. Default: none, as in the paper: all bodies share one nodal field, and stick to each other where they share nodes.
+    pub contact: Option<contact::Contact>,
     /// Initial velocities of nodes. Bodies and particle files must then give no velocities.
     pub initial_velocity: Option<InitialVelocity>,
     /// The solver of the equations of a step.
@@ -245,14 +248,25 @@ impl Scene {
         let courant = || accuracy::courant(&self.bodies, self.grid.spacing, self.time.step).unwrap_or(0.0);
         let long_steps = self.time.adaptive.is_none() && (!has_inertia || courant() > LONG_STEPS);
         let consistent = has_inertia && self.lumping() == 0.0;
-        let needed = long_steps || consistent || computed || !self.obstacles.is_empty();
+        let needed = long_steps || consistent || computed || self.has_contact();
         self.aggregation.or(self.ghost_stiffness.map(|factor| factor > 0.0)).unwrap_or(needed)
     }
 
-    /// ε, the lumped share of the mass. Bodies that roll on obstacles or leave them lose energy with a lumped mass, and a consistent one
+    /// Whether surfaces may touch an obstacle or another body.
+    fn has_contact(&self) -> bool {
+        !self.obstacles.is_empty() || self.contact.is_some()
+    }
+
+    /// The nodal field of each body.
+    pub(super) fn nodal_fields(&self) -> Vec<u32> {
+        let names: Vec<&str> = self.bodies.iter().map(|body| body.name.as_str()).collect();
+        self.contact.as_ref().map_or_else(|| vec![0; names.len()], |contact| contact.fields(&names))
+    }
+
+    /// ε, the lumped share of the mass. Bodies that touch obstacles or each other lose energy with a lumped mass, and a consistent one
     /// makes the force of contact ring.
     pub(super) fn lumping(&self) -> f64 {
-        let default = if self.obstacles.is_empty() { 1.0 } else { LUMPING_AT_OBSTACLES };
+        let default = if self.has_contact() { LUMPING_IN_CONTACT } else { 1.0 };
         self.time.lumping.unwrap_or(default)
     }
 
@@ -262,7 +276,7 @@ impl Scene {
         let flip = self.transfer.is_none_or(|transfer| transfer == transfer::Transfer::Flip);
         self.grid.given_reset().unwrap_or(match self.time.scheme().has_inertia() {
             false => GridReset::Strain(STATIC_STRAIN),
-            true if flip && (self.is_clamped() || !self.obstacles.is_empty()) => GridReset::Strain(VIBRATION_STRAIN),
+            true if flip && (self.is_clamped() || self.has_contact()) => GridReset::Strain(VIBRATION_STRAIN),
             true => GridReset::EveryStep,
         })
     }
@@ -309,8 +323,9 @@ impl Scene {
     fn unsymmetric(&self) -> Option<&'static str> {
         let has_friction = self.laws().any(|law| !law.is_symmetric());
         let friction = has_friction.then_some("a law with friction makes");
-        let has_rough_obstacle = self.obstacles.iter().any(|obstacle| obstacle.friction > 0.0);
-        let friction = friction.or(has_rough_obstacle.then_some("obstacles with friction make"));
+        let rough =
+            self.obstacles.iter().map(|obstacle| obstacle.friction).chain(self.contact.iter().map(|one| one.friction));
+        let friction = friction.or(rough.fold(0.0, f64::max).gt(&0.0).then_some("contact with friction makes"));
         if self.pressures.is_empty() { friction } else { Some("pressures make") }
     }
 
@@ -352,6 +367,7 @@ impl Scene {
         for i in 0..self.obstacles.len() {
             problems.refuse(&format!("obstacles[{i}]"), "an obstacle", allowed);
         }
+        problems.require(self.contact.is_none(), "contact", "contact between bodies", allowed);
         let kept = self.grid.given_reset() != Some(GridReset::EveryStep);
         problems.require(kept, "grid.reset", "\"every_step\"", allowed);
     }
@@ -386,6 +402,10 @@ impl Scene {
             load.check(problems, &path, &self.bodies, dimension);
         }
         self.check_obstacles(problems, dimension);
+        if let Some(contact) = &self.contact {
+            let names: Vec<&str> = self.bodies.iter().map(|body| body.name.as_str()).collect();
+            contact.check(problems, &names, dimension);
+        }
     }
 
     fn check_obstacles(&self, problems: &mut Problems, dimension: usize) {
@@ -397,9 +417,8 @@ impl Scene {
             problems.require(!again, &format!("{path}.name"), format_args!("{:?}", obstacle.name), allowed);
         }
         let from_files = self.bodies.iter().enumerate().filter(|(_, body)| body.particles.is_some());
-        for (i, _) in from_files.filter(|_| !self.obstacles.is_empty()) {
-            let allowed =
-                "must be a shape where there are obstacles: bodies touch them at points of the surface of their shape";
+        for (i, _) in from_files.filter(|_| self.has_contact()) {
+            let allowed = "must be a shape where bodies touch obstacles or each other: they do so at points of the surface of their shape";
             problems.refuse(&format!("bodies[{i}].particles"), "a file of particles", allowed);
         }
     }

@@ -34,12 +34,30 @@ pub struct Obstacle {
 }
 
 /// The stiffness of contact that delays a rebound by a few percent of the time of contact, and needs few Newton iterations.
-fn default_stiffness() -> f64 {
+pub(super) fn default_stiffness() -> f64 {
     1.0
 }
 
 /// A larger stiffness gets a warning. At 100, the force of an impact rings with four times its value (`docs/src/obstacles.md`).
 const STIFFEST: f64 = 100.0;
+
+/// Checks the constants of contact.
+pub(super) fn check_law(problems: &mut Problems, path: &str, friction: f64, stiffness: f64, dimension: usize) {
+    problems.between(&format!("{path}.friction"), friction, 0.0, 100.0);
+    let allowed = "must be 0: in one dimension nothing slides";
+    problems.require(dimension > 1 || friction == 0.0, &format!("{path}.friction"), friction, allowed);
+    problems.positive(&format!("{path}.stiffness"), stiffness);
+}
+
+/// A warning about a stiffness that gains nothing.
+pub(super) fn too_stiff(path: &str, stiffness: f64) -> Option<String> {
+    (stiffness > STIFFEST).then(|| {
+        format!(
+            "{path}.stiffness = {stiffness:e} is above {STIFFEST}: the depth is negligible below that already, and Newton's method and the \
+             force get worse; lower it"
+        )
+    })
+}
 
 impl Obstacle {
     /// The motion; at rest if none is given.
@@ -57,13 +75,7 @@ impl Obstacle {
         if apart {
             return Some(format!("{path} rests outside the grid, and bodies stay inside it: nothing can touch it"));
         }
-        (self.stiffness > STIFFEST).then(|| {
-            format!(
-                "{path}.stiffness = {:e} is above {STIFFEST}: the depth is negligible below that already, and Newton's method and the force \
-                 get worse; lower it",
-                self.stiffness
-            )
-        })
+        too_stiff(path, self.stiffness)
     }
 
     pub(super) fn check(&self, problems: &mut Problems, path: &str, dimension: usize) {
@@ -77,10 +89,7 @@ impl Obstacle {
             let allowed = "must hold something: its parts do not meet";
             problems.require(!empty, &format!("{path}.shape"), "an empty shape", allowed);
         }
-        problems.between(&format!("{path}.friction"), self.friction, 0.0, 100.0);
-        let allowed = "must be 0: in one dimension nothing slides";
-        problems.require(dimension > 1 || self.friction == 0.0, &format!("{path}.friction"), self.friction, allowed);
-        problems.positive(&format!("{path}.stiffness"), self.stiffness);
+        check_law(problems, path, self.friction, self.stiffness, dimension);
         let given = self.given();
         given.iter().for_each(|(_, motion)| motion.check(problems, path, dimension));
         let keys: Vec<_> = given.iter().map(|(key, _)| *key).collect();

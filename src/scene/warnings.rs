@@ -83,7 +83,8 @@ impl Scene {
         all.extend(without_nodes(grid, "prescribed", prescribed));
         let initial = self.initial_velocity.iter().flat_map(|initial| &initial.nodes);
         all.extend(without_nodes(grid, "initial_velocity.nodes", initial.filter_map(|node| node.region.build())));
-        let moving = simulation.loads.obstacles.list.iter().map(Obstacle::moves);
+        all.extend(self.contact.as_ref().and_then(super::contact::Contact::warning));
+        let moving = simulation.loads.contacts.obstacles.iter().map(Obstacle::moves);
         all.extend(self.obstacles.iter().zip(moving).enumerate().filter_map(|(i, (obstacle, moves))| {
             let shape = obstacle.shape.build()?;
             obstacle.warning(&format!("obstacles[{i}]"), !moves && apart(grid, &shape))

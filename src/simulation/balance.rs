@@ -120,8 +120,8 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         if !equilibrium.step.nodal.is_static() || matches!(error.cause, NewtonFailure::Stopped) {
             return StepError::Newton(error);
         }
-        // Obstacles may hold the bodies, and a shorter step may find the contact.
-        let free = self.loads.obstacles.list.is_empty();
+        // Contact may hold the bodies, and a shorter step may find it.
+        let free = !self.loads.contacts.exist();
         match loose(&self.grid, equilibrium, supports.active()).filter(|_| free) {
             Some(loose) => StepError::Loose { loose, source: error },
             None => StepError::Unbalanced { source: error },

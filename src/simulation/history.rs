@@ -83,7 +83,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     ) -> f64 {
         self.external_work += accounts.work;
         self.dissipated += accounts.dissipated;
-        self.accept_obstacles(&accounts.obstacles);
+        self.accept_contacts(&accounts.contacts);
         let dt = self.clock.step();
         let field_positions = self.field_positions();
         let mut grid = None;
@@ -94,7 +94,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         }
         let Committed { strain, yielding } = update.commit(&mut self.particles, &self.bodies, supports, dt);
         if self.clock.steps() == 0 {
-            self.record_first_contacts(prescribed);
+            self.record_first_contacts(prescribed, supports);
         }
         // Contact detection also updates the constrained conditions.
         let contact = grid.is_some() && self.in_contact(supports, prescribed);
@@ -113,16 +113,16 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     }
 
     /// Records the prescribed conditions that hold bodies from the start, and the bodies that touch.
-    fn record_first_contacts(&mut self, prescribed: &[PrescribedDof]) {
+    fn record_first_contacts(&mut self, prescribed: &[PrescribedDof], supports: &Supports<D>) {
         self.history.constrained = prescribed.iter().map(|dof| dof.owner).collect();
         if self.settings.grid_reset != GridReset::EveryStep && self.bodies.len() > 1 {
             let at_start = self.particles.reference().position;
-            self.history.bonded = pairs(at_start, &self.particles.body, &self.grid);
+            self.history.bonded = pairs(at_start, &self.particles.body, supports);
         }
     }
 
     fn bodies_touch(&self, supports: &Supports<D>) -> bool {
-        self.bodies.len() > 1 && touch(&self.particles, &self.grid, supports)
+        self.bodies.len() > 1 && touch(&self.particles, supports)
     }
 
     /// Whether a contact, a prescribed condition outside [`History::constrained`], has active nodes in this step.
@@ -141,7 +141,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         if self.settings.scheme.has_inertia() {
             return self.feels_wall(prescribed) || self.bodies_touch(supports);
         }
-        self.bodies.len() > 1 && reached_body(&self.particles, &self.history.bonded, &self.grid)
+        self.bodies.len() > 1 && reached_body(&self.particles, &self.history.bonded, supports)
     }
 
     /// The out-of-balance force R₀ on a new grid; empty with inertia and on the first grid. Also empty where a body has lost a condition or

@@ -1,9 +1,9 @@
 //! A simulation: the state at the last converged step, and the step that advances this state (`step.rs`).
 
 mod balance;
+mod contacts;
 mod history;
 mod next_step;
-mod obstacles;
 mod preconditioner;
 mod report;
 mod settings;
@@ -13,9 +13,9 @@ mod touching;
 mod work;
 
 pub use crate::mechanics::loads::Reaction;
+pub use contacts::ContactForces;
 pub use history::History;
 pub use next_step::NextStep;
-pub use obstacles::ObstacleContact;
 pub use report::{AdvanceError, FailedAttempt, StepError, StepReport};
 pub use settings::{InitialGuess, Settings};
 pub use touching::Sharing;
@@ -28,7 +28,7 @@ use crate::mechanics::loads::Loads;
 use crate::mechanics::path::Path;
 use crate::mechanics::residual::unsymmetric;
 use crate::mechanics::schemes::Alphas;
-use crate::mechanics::sweep::Supports;
+use crate::mechanics::sweep::{Fields, Points, Supports};
 use crate::mechanics::transfer::Nodal;
 use crate::mechanics::unknowns::Unknowns;
 use crate::particles::{Body, Particles};
@@ -73,7 +73,7 @@ pub struct Simulation<const D: usize, L = Material, A = Approximation> {
     pub clock: Clock,
     /// Work of gravity, tractions, pressure, moving walls and moving obstacles since the start.
     pub external_work: f64,
-    /// Energy dissipated by damping and by friction at obstacles since the start.
+    /// Energy dissipated by damping and by friction since the start.
     pub dissipated: f64,
     /// The point on the equilibrium path, for a scheme that follows one.
     pub path: Path,
@@ -119,7 +119,7 @@ impl<const D: usize, L, A> Simulation<D, L, A> {
     /// let law = Material::from(NeoHookean::ciarlet(Lame::new(0.5, 0.25)?));
     /// let mut particles = Particles::default();
     /// particles.push_without_inertia(Vector::from([1.75]), 0.5, 0.5, 0);
-    /// let bodies = vec![Body { name: "bar".into(), law, density: 1.0, dilatation: Default::default() }];
+    /// let bodies = vec![Body { name: "bar".into(), law, density: 1.0, dilatation: Default::default(), field: 0 }];
     /// let simulation = Simulation {
     ///     settings: Settings { scheme: Arc::new(Statics), ..Settings::default() },
     ///     ..Simulation::new(grid, Bspline::Quadratic, bodies, particles, Clock::new(1.0, 0))
@@ -251,8 +251,8 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// ```
     pub fn with_laws<M: Law>(self, law: impl Fn(&Body<L>) -> M) -> Simulation<D, M, A> {
         let with_law = |body: &Body<L>| {
-            let Body { name, law: _, density, dilatation } = body;
-            Body { name: name.clone(), law: law(body), density: *density, dilatation: *dilatation }
+            let Body { name, law: _, density, dilatation, field } = body;
+            Body { name: name.clone(), law: law(body), density: *density, dilatation: *dilatation, field: *field }
         };
         let bodies: Vec<_> = self.bodies.iter().map(with_law).collect();
         let mut particles = self.particles;
@@ -319,7 +319,9 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         &mut self,
         velocity: impl Fn(&Vector<f64, D>) -> Vector<f64, D>,
     ) -> Result<(), StepError> {
-        let (supports, nodes) = Supports::new(&self.approximation, &self.grid, &self.particles.position)?;
+        let points =
+            Points { fields: Fields::of(&self.bodies, &self.particles.body), ..Points::at(&self.particles.position) };
+        let (supports, nodes) = Supports::rebuilt(None, &self.approximation, &self.grid, &points, &Pool::default())?;
         let nodal: Vec<_> = nodes.positions(&self.grid).map(|(_, x)| velocity(&x)).collect();
         self.particles.velocity = supports.values(&nodal);
         Ok(())

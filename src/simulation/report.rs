@@ -1,6 +1,6 @@
 //! Reports and errors of a step.
 
-use super::{ObstacleContact, Sharing};
+use super::{ContactForces, Sharing};
 use crate::causes;
 use crate::mechanics::check::CheckError;
 use crate::mechanics::loads::Reaction;
@@ -23,8 +23,10 @@ pub struct StepReport<const D: usize> {
     pub projection_iterations: usize,
     /// Reactions, one for each of [`Loads::prescribed`](crate::mechanics::loads::Loads::prescribed).
     pub reactions: Vec<Reaction<D>>,
-    /// Contact with obstacles, one for each of [`Obstacles::list`](crate::mechanics::loads::Obstacles::list).
-    pub obstacles: Vec<ObstacleContact<D>>,
+    /// Contact with obstacles, one for each of [`Contacts::obstacles`](crate::mechanics::loads::Contacts::obstacles).
+    pub obstacles: Vec<ContactForces<D>>,
+    /// Contact between bodies, one for each of [`BodyContact::pairs`](crate::mechanics::loads::BodyContact::pairs).
+    pub pairs: Vec<ContactForces<D>>,
     /// Local error in grid spacings, if a tolerance is set. The error exceeds the tolerance only if the step could not be halved.
     pub error: Option<f64>,
     /// Whether the grid was reset before the step.
@@ -44,9 +46,9 @@ pub struct StepReport<const D: usize> {
 }
 
 impl<const D: usize> StepReport<D> {
-    /// Whether a body touches an obstacle.
-    pub fn touches_obstacle(&self) -> bool {
-        self.obstacles.iter().any(|contact| contact.area > 0.0)
+    /// Whether a body touches an obstacle or another body.
+    pub fn touches(&self) -> bool {
+        self.obstacles.iter().chain(&self.pairs).any(|contact| contact.area > 0.0)
     }
 }
 
@@ -178,6 +180,20 @@ pub enum StepError {
     EntersObstacle {
         /// Name of the obstacle.
         obstacle: String,
+        /// Position of the point at the start of the step.
+        position: Vec<f64>,
+        /// Depth at the end of the step, in grid spacings.
+        depth: f64,
+    },
+    /// A point of a body enters another body too deeply, or bodies approach too fast.
+    #[error(
+        "the point of body {:?} at {position:?} comes {depth:.2} grid spacings deep into body {:?} in one step, or approaches the body so \
+         fast that contact may be missed: take shorter steps, or a stiffer contact (contact.stiffness)",
+        bodies[0], bodies[1]
+    )]
+    EntersBody {
+        /// Names of the body of the point, and of the body that it enters.
+        bodies: [String; 2],
         /// Position of the point at the start of the step.
         position: Vec<f64>,
         /// Depth at the end of the step, in grid spacings.

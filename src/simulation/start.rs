@@ -6,7 +6,7 @@ use crate::material::Law;
 use crate::mechanics::loads::{PrescribedDof, at_surface_points, prescribed_dofs};
 use crate::mechanics::residual::Equilibrium;
 use crate::mechanics::schemes::Alphas;
-use crate::mechanics::sweep::{Points, SupportError, Supports};
+use crate::mechanics::sweep::{Fields, Points, SupportError, Supports};
 use crate::mechanics::terms;
 use crate::mechanics::transfer::{Nodal, Projection};
 use crate::mechanics::unknowns::extension;
@@ -25,8 +25,9 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
 
     /// The shape functions in the reference configuration, in the memory of `spare`, which is no longer needed.
     pub(crate) fn new_supports(&self, spare: Option<Supports<D>>) -> Result<Supports<D>, SupportError> {
-        let Self { particles, loads, approximation, grid, settings, workspace, .. } = self;
-        let mut points = Points { ids: Some(&particles.id), ..Points::at(particles.reference().position) };
+        let Self { particles, bodies, loads, approximation, grid, settings, workspace, .. } = self;
+        let fields = Fields::of(bodies, &particles.body);
+        let mut points = Points { ids: Some(&particles.id), fields, ..Points::at(particles.reference().position) };
         if settings.aggregation {
             let at_surface = approximation.separable().map_or(AtSurface::Own, Separable::at_surface);
             points = at_surface_points(points, particles, loads, grid, at_surface);

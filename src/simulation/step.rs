@@ -39,6 +39,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// A step like [`Self::step`]. `spent` counts the work, also if the step fails.
     fn attempt(&mut self, spent: &mut Spent) -> Result<StepReport<D>, StepError> {
         self.particles.make_room_for_internal(&self.bodies);
+        self.find_facing();
         let (dt, scheme, watch) = (self.clock.step(), self.settings.scheme.clone(), &mut spent.watch);
 
         let supports = self.supports()?;
@@ -85,7 +86,8 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             newton,
             projection_iterations: projected.iterations,
             reactions: accounts.reactions,
-            obstacles: accounts.obstacles.contacts,
+            obstacles: accounts.contacts.obstacles,
+            pairs: accounts.contacts.pairs,
             error,
             reset,
             feels_wall,
@@ -192,11 +194,10 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
                 | StepError::LawFailed { .. }
                 | StepError::Unbalanced { .. }
                 | StepError::EntersObstacle { .. }
+                | StepError::EntersBody { .. }
                 | StepError::Inaccurate { .. } => true,
-                // The step may be too long to meet a wall or an obstacle.
-                StepError::LeftGrid { .. } => {
-                    self.settings.error_tolerance.is_some() || !self.loads.obstacles.list.is_empty()
-                }
+                // The step may be too long to meet a wall, an obstacle or another body.
+                StepError::LeftGrid { .. } => self.settings.error_tolerance.is_some() || self.loads.contacts.exist(),
                 // Forces are in balance before the end of the step, but det F ≤ 0 at its end.
                 StepError::Inadmissible(_) => self.settings.scheme.instant() < 1.0,
                 _ => false,

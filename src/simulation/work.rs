@@ -1,6 +1,6 @@
 //! Reactions of a step, and the work of all external forces.
 
-use super::obstacles::ObstacleUpdate;
+use super::contacts::ContactUpdate;
 use super::{Reaction, Simulation, StepError};
 use crate::approximation::ShapeFunction;
 use crate::material::Law;
@@ -17,9 +17,9 @@ pub(super) struct Accounts<const D: usize> {
     pub reactions: Vec<Reaction<D>>,
     /// The work of loads, of moving walls and of moving obstacles.
     pub work: f64,
-    /// The energy dissipated by damping and by friction at obstacles.
+    /// The energy dissipated by damping and by friction.
     pub dissipated: f64,
-    pub obstacles: ObstacleUpdate<D>,
+    pub contacts: ContactUpdate<D>,
 }
 
 impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
@@ -78,9 +78,9 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             let lost = |equilibrium: &Equilibrium<'_, D, L>, phi| equilibrium.forces(Role::Dissipates, phi);
             dissipated = mean_work(&lost(end, phi)?, &lost(&start, &before)?, dphi);
         }
-        let obstacles = self.obstacle_update(&balanced.step, phi)?;
-        let (work, dissipated) = (work + obstacles.work, dissipated + obstacles.friction_loss);
-        Ok(Accounts { reactions, work, dissipated, obstacles })
+        let contacts = self.contact_update(&balanced.step, phi)?;
+        let (work, dissipated) = (work + contacts.work, dissipated + contacts.friction_loss);
+        Ok(Accounts { reactions, work, dissipated, contacts })
     }
 }
 

@@ -29,14 +29,14 @@ fn a_body_bounces_off_an_obstacle_and_momentum_is_the_impulse() -> Result<(), Fa
         (0..2).for_each(|i| impulse[i] += 0.5 * step.dt * (force[i] + last[i]));
         last = [force[0], force[1]];
         assert!(force[1] <= 0.0, "the floor pulls: {force}");
-        touched |= step.touches_obstacle();
+        touched |= step.touches();
     }
     let (after, scale) = (simulation.particles.momentum(), before.norm());
     assert!(touched && after[1] > 0.5 * -before[1], "no rebound: {after}");
     assert!((0..2).all(|i| (after[i] - before[i] + impulse[i]).abs() < 0.02 * scale), "{after} {before} {impulse:?}");
     // It slides with friction, so the impulse along the floor is μ times that across the floor.
     assert!((impulse[0] / -impulse[1] - 0.3).abs() < 0.02, "{impulse:?}");
-    let floor = &simulation.loads.obstacles.list[0];
+    let floor = &simulation.loads.contacts.obstacles[0];
     assert!(floor.friction_loss > 0.0 && floor.work == 0.0);
     Ok(())
 }
@@ -59,7 +59,7 @@ fn the_work_of_a_moving_obstacle_is_the_energy_of_the_body() -> Result<(), Failu
     let mut simulation: Simulation<2> = built(&scene)?;
     run_to(&mut simulation, 0.4)?;
     let energy = simulation.particles.kinetic_energy() + simulation.strain_energy() + simulation.contact_energy();
-    let plate = &simulation.loads.obstacles.list[0];
+    let plate = &simulation.loads.contacts.obstacles[0];
     assert!((plate.work / simulation.external_work - 1.0).abs() < 1e-12, "{}", plate.work);
     assert!((energy / plate.work - 1.0).abs() < 0.02, "{energy} {}", plate.work);
     Ok(())
@@ -71,13 +71,13 @@ fn a_restart_gives_the_same_bits_while_friction_sticks() -> Result<(), Failure> 
         with(falling(), &[("/obstacles/0/friction", json!(2)), ("/gravity", json!({ "acceleration": [1, -9.81] }))]);
     let start: Simulation<2> = built(&scene)?;
     let mut simulation = start.clone();
-    while !simulation.advance()?.touches_obstacle() {}
+    while !simulation.advance()?.touches() {}
     let mut continued = restored(&simulation, &start)?;
-    assert_eq!(continued.loads.obstacles, simulation.loads.obstacles);
+    assert_eq!(continued.loads.contacts, simulation.loads.contacts);
     advance(&mut simulation, 5)?;
     advance(&mut continued, 5)?;
     assert_eq!(continued.particles, simulation.particles);
-    assert_eq!(continued.loads.obstacles, simulation.loads.obstacles);
+    assert_eq!(continued.loads.contacts, simulation.loads.contacts);
     Ok(())
 }
 
@@ -87,7 +87,7 @@ fn the_number_of_threads_does_not_change_a_bit_of_contact() -> Result<(), Failur
         in_threads(threads, || {
             let mut simulation: Simulation<2> = built(&falling())?;
             advance(&mut simulation, 15)?;
-            Ok((simulation.particles, simulation.loads.obstacles))
+            Ok((simulation.particles, simulation.loads.contacts))
         })
     };
     assert_eq!(state(1)?, state(3)?);

@@ -157,7 +157,7 @@ pub fn closed_laws(lame: Lame) -> Vec<Material> {
 
 /// A body of density 1.
 pub fn body<L>(law: L) -> Body<L> {
-    Body { name: "body".into(), law, density: 1.0, dilatation: Default::default() }
+    Body { name: "body".into(), law, density: 1.0, dilatation: Default::default(), field: 0 }
 }
 
 /// The number of calls of a law.

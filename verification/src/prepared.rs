@@ -5,9 +5,10 @@ use bfree::material::Law;
 use bfree::mechanics::loads::PrescribedDof;
 use bfree::mechanics::residual::Equilibrium;
 use bfree::mechanics::schemes::Alphas;
-use bfree::mechanics::sweep::Supports;
+use bfree::mechanics::sweep::{Fields, Points, Supports};
 use bfree::mechanics::transfer::Nodal;
 use bfree::nodes::Nodes;
+use bfree::pooled::Pool;
 use bfree::simulation::{InitialGuess, Simulation, StepError};
 use bfree::tensor::Vector;
 
@@ -35,8 +36,11 @@ impl<const D: usize> Prepared<D> {
     /// A particle without shape functions, or a projection that overflows.
     pub fn new<L: Law, A: ShapeFunction>(simulation: &Simulation<D, L, A>) -> Result<Self, StepError> {
         let (t, dt) = (simulation.clock.time(), simulation.clock.step());
+        let positions = &simulation.particles.position;
+        let fields = Fields::of(&simulation.bodies, &simulation.particles.body);
+        let points = Points { fields, ..Points::at(positions) };
         let (supports, nodes) =
-            Supports::new(&simulation.approximation, &simulation.grid, &simulation.particles.position)?;
+            Supports::rebuilt(None, &simulation.approximation, &simulation.grid, &points, &Pool::default())?;
         let supports = simulation.aggregated(supports);
         let prescribed = simulation.prescribed(&nodes);
         let nodal = simulation.project(&supports)?.with_prescribed(&prescribed);

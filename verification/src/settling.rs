@@ -46,6 +46,7 @@ pub(crate) fn block<const D: usize>(
         law: law.unwrap_or_else(|| NeoHookean::ciarlet(lame).into()),
         density: 1.0,
         dilatation: Default::default(),
+        field: 0,
     }];
     Ok(Simulation {
         loads: Loads {

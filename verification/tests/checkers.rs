@@ -143,7 +143,7 @@ fn patch<L: Law>(law: L) -> Simulation<2, L> {
         particles.push(position, Vector::from([0.4 * k - i, 0.7 * i]), 0.09, 0.09, 0);
     }
     let grid = Grid { origin: Vector::zeros(), spacing: 0.5, cells: [6, 6] };
-    let bodies = vec![Body { name: "patch".into(), law, density: 1.0, dilatation: Default::default() }];
+    let bodies = vec![Body { name: "patch".into(), law, density: 1.0, dilatation: Default::default(), field: 0 }];
     Simulation {
         settings: Settings { lumping: 0.5, ..Settings::default() },
         ..Simulation::new(grid, Bspline::Quadratic.into(), bodies, particles, Clock::new(0.01, 0))

@@ -22,7 +22,7 @@ pub(crate) fn at_surface_points<'a, const D: usize>(
     at_surface: AtSurface<'_>,
 ) -> Points<'a, D> {
     let reference = particles.reference();
-    let of_surface = loads.surface.iter().flat_map(|load| &load.points).chain(&loads.obstacles.points);
+    let of_surface = loads.surface.iter().flat_map(|load| &load.points).chain(&loads.contacts.points);
     let on_surface: BTreeMap<u32, Vector<f64, D>> = of_surface
         .filter(|point| !particles.is_solid(point.particle))
         .map(|point| {

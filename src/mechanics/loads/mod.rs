@@ -1,6 +1,7 @@
 //! Loads and prescribed motion: gravity and its curve, tractions, follower pressure, moving walls.
 
 mod at_surface;
+mod contacts;
 mod curve;
 mod force_field;
 mod motion_step;
@@ -10,10 +11,11 @@ mod rayleigh;
 mod rotation;
 
 pub(crate) use at_surface::at_surface_points;
+pub use contacts::{BodyContact, Contacts, Facing, Pair, Partner};
 pub use curve::{Curve, CurveError};
 pub use force_field::{Field, ForceField};
 pub use motion_step::MotionStep;
-pub use obstacle::{Obstacle, Obstacles, Pose};
+pub use obstacle::{Obstacle, Pose};
 pub use prescribed::{Motion, Prescribed, PrescribedDof, Reaction, Selection, prescribed_dofs};
 pub use rayleigh::Rayleigh;
 pub use rotation::Rotation;
@@ -74,8 +76,8 @@ pub struct Loads<const D: usize> {
     pub field: Option<ForceField<D>>,
     /// Damping, if any.
     pub damping: Option<Rayleigh>,
-    /// Rigid obstacles that bodies touch.
-    pub obstacles: Obstacles<D>,
+    /// Contact with obstacles and between bodies.
+    pub contacts: Contacts<D>,
 }
 
 /// p A N of a particle under follower pressure.
@@ -94,9 +96,9 @@ impl<const D: usize> Loads<D> {
         of_kind.flat_map(|load| &load.points).map(|point| point.particle).collect::<HashSet<_>>().len()
     }
 
-    /// All points of surfaces that carry loads or may touch obstacles.
+    /// All points of surfaces that carry loads or may touch something.
     pub(crate) fn points_mut(&mut self) -> impl Iterator<Item = &mut SurfacePoint<D>> {
-        self.surface.iter_mut().flat_map(|load| &mut load.points).chain(&mut self.obstacles.points)
+        self.surface.iter_mut().flat_map(|load| &mut load.points).chain(&mut self.contacts.points)
     }
 
     /// p A N of every particle under follower pressure at time `t`.

@@ -1,18 +1,8 @@
 //! Rigid obstacles that bodies touch: their shape, their motion, and the state of their friction.
 
-use super::SurfacePoint;
 use super::prescribed::Motion;
 use crate::shape::Shape;
 use crate::tensor::{Tensor, Vector, identity};
-
-/// The obstacles, and the points of the bodies' surfaces that may touch them.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Obstacles<const D: usize> {
-    /// The points.
-    pub points: Vec<SurfacePoint<D>>,
-    /// The obstacles.
-    pub list: Vec<Obstacle<D>>,
-}
 
 /// A rigid obstacle. Bodies touch it without adhesion, with Coulomb friction.
 #[derive(Clone, Debug, PartialEq)]
@@ -27,7 +17,7 @@ pub struct Obstacle<const D: usize> {
     pub stiffness: f64,
     /// The coefficient of friction μ, ≥ 0.
     pub friction: f64,
-    /// The anchors of friction at t_n, one for each of [`Obstacles::points`], in the frame of the obstacle. The elastic slip of a point is
+    /// The anchors of friction at t_n, one for each of [`Contacts::points`], in the frame of the obstacle. The elastic slip of a point is
     /// its distance from its anchor along the surface. Empty without friction.
     pub anchors: Vec<Vector<f64, D>>,
     /// The work of the moving obstacle on the bodies since the start.
@@ -92,21 +82,6 @@ impl<const D: usize> Obstacle<D> {
     /// Whether the obstacle moves at any time.
     pub fn moves(&self) -> bool {
         self.motion.iter().flatten().any(|motion| *motion != Motion::Rest)
-    }
-}
-
-impl<const D: usize> Obstacles<D> {
-    /// Whether friction acts at an obstacle.
-    pub fn have_friction(&self) -> bool {
-        self.list.iter().any(|obstacle| obstacle.friction > 0.0)
-    }
-
-    /// Puts the anchors of friction to the points of surfaces at `positions` at time `t`.
-    pub(crate) fn anchor(&mut self, positions: &[Vector<f64, D>], t: f64) {
-        for obstacle in self.list.iter_mut().filter(|obstacle| obstacle.friction > 0.0) {
-            let pose = obstacle.pose(t);
-            obstacle.anchors = self.points.iter().map(|point| pose.to_frame(&positions[point.particle])).collect();
-        }
     }
 }
 

@@ -47,19 +47,25 @@ pub(crate) fn reached_conditions<const D: usize>(
 pub(crate) fn reached_body<const D: usize>(
     particles: &Particles<D>,
     bonded: &BTreeSet<[u32; 2]>,
-    grid: &Grid<D>,
+    supports: &Supports<D>,
 ) -> bool {
     mutant!("reference: no body that is met resets the grid": { return false; });
-    let body = &particles.body;
+    let (grid, body) = (supports.grid(), &particles.body);
     let at_reset = particles.reference().position;
     let [now, before] = [&particles.position[..], at_reset].map(|position| seen(position, body, grid));
     let beside = |x: &Vector<f64, D>, own: u32, seen: &HashMap<u64, BTreeSet<u32>>| {
         let others = |index| seen.get(&grid.id(index)).into_iter().flatten();
-        let is_contact = |&other: &u32| other != own && !bonded.contains(&pair(own, other));
+        let is_contact =
+            |&other: &u32| other != own && stick(supports, pair(own, other)) && !bonded.contains(&pair(own, other));
         grid.cell(x).is_some_and(|cell| corners(cell).flat_map(others).any(is_contact))
     };
     let mut all = particles.position.iter().zip(at_reset).zip(body);
     all.any(|((x, was), &own)| beside(x, own, &now) && !beside(was, own, &before))
+}
+
+/// Whether two bodies stick to each other where they share nodes.
+fn stick<const D: usize>(supports: &Supports<D>, bodies: [u32; 2]) -> bool {
+    supports.field_of(bodies[0]) == supports.field_of(bodies[1])
 }
 
 fn pair(one: u32, other: u32) -> [u32; 2] {
@@ -77,20 +83,24 @@ fn seen<const D: usize>(position: &[Vector<f64, D>], body: &[u32], grid: &Grid<D
     seen
 }
 
-/// The pairs of bodies that lie in cells with a common corner.
-pub(crate) fn pairs<const D: usize>(position: &[Vector<f64, D>], body: &[u32], grid: &Grid<D>) -> BTreeSet<[u32; 2]> {
+/// The pairs of bodies of one nodal field that lie in cells with a common corner.
+pub(crate) fn pairs<const D: usize>(
+    position: &[Vector<f64, D>],
+    body: &[u32],
+    supports: &Supports<D>,
+) -> BTreeSet<[u32; 2]> {
     let mut pairs = BTreeSet::new();
-    for bodies in seen(position, body, grid).values() {
+    for bodies in seen(position, body, supports.grid()).values() {
         for &one in bodies {
-            pairs.extend(bodies.range(one + 1..).map(|&other| [one, other]));
+            pairs.extend(bodies.range(one + 1..).map(|&other| [one, other]).filter(|&pair| stick(supports, pair)));
         }
     }
     pairs
 }
 
-/// Whether two bodies lie in cells with a common corner now, or shared a node when the shape functions were evaluated.
-pub(crate) fn touch<const D: usize>(particles: &Particles<D>, grid: &Grid<D>, supports: &Supports<D>) -> bool {
-    if !pairs(&particles.position, &particles.body, grid).is_empty() {
+/// Whether two bodies of one nodal field lie in cells with a common corner now, or shared a node when the shape functions were evaluated.
+pub(crate) fn touch<const D: usize>(particles: &Particles<D>, supports: &Supports<D>) -> bool {
+    if !pairs(&particles.position, &particles.body, supports).is_empty() {
         return true;
     }
     // The variance of the body index, weighted with N.

@@ -15,6 +15,8 @@ pub(super) struct Block {
     pub(super) weights: Vec<[f64; LANES]>,
     /// Particles of each group. The weights of unused lanes are zero.
     pub(super) particles: Vec<[u32; LANES]>,
+    /// The nodal field of its nodes.
+    pub(super) field: u32,
     /// Index of the first node of the box along each axis.
     pub(super) origin: [u32; 3],
     /// Nodes of the box along each axis; 1 along axes that do not exist.

@@ -45,6 +45,7 @@ impl<const D: usize> Builder<'_, D> {
         scratch: &mut Scratch,
     ) -> Result<(), ApproximationError> {
         (block.origin, block.size) = ([0; 3], [1; 3]);
+        block.field = keys.first().map_or(0, |key| self.points.fields.field(key.particle as usize));
         for (k, along) in scratch.along.iter_mut().enumerate().take(D) {
             along.x.clear();
             along.x.extend(keys.iter().map(|key| self.points.positions[key.particle as usize][k]));
@@ -212,7 +213,13 @@ pub(super) fn number<const D: usize>(
                 let x = index[0] as usize;
                 index[0] = 0;
                 let place = (z * ny + y) * nx;
-                rows.push(Row { start: grid.id(index), x, block: b, place, active: block.active[z * ny + y] });
+                rows.push(Row {
+                    start: grid.id_in(block.field, index),
+                    x,
+                    block: b,
+                    place,
+                    active: block.active[z * ny + y],
+                });
             }
         }
     }

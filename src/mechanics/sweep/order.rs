@@ -1,8 +1,8 @@
-//! The order of particles in [`Tiled`](super::tiled::Tiled): by block of cells, then by cell, then by id.
+//! The order of particles in [`Tiled`](super::tiled::Tiled): by nodal field, then by block of cells, then by cell, then by id.
 
+use super::points::Points;
 use crate::grid::Grid;
 use crate::parallel;
-use crate::tensor::Vector;
 
 /// Edge of a block in cells. In 3D the nodal values that a block gathers and scatters then stay in the first-level cache.
 const fn edge(dimension: usize) -> u64 {
@@ -19,29 +19,28 @@ const RUN: usize = 4096;
 /// A particle and its cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Key {
-    /// block · cells of a block + cell in the block
+    /// (field · blocks + block) · cells of a block + cell in the block
     pub(super) cell: u64,
     id: u32,
     /// Its index in memory.
     pub(super) particle: u32,
 }
 
-/// All particles, sorted by block, cell and id. Without `ids` the index in memory is the id. `keys` may come from the last step: the
+/// All particles, sorted by field, block, cell and id. Without ids the index in memory is the id. `keys` may come from the last step: the
 /// nearer they are to the new order, the less work the sorting is.
 ///
 /// # Errors
 /// The index of the particle with the smallest id that lies in no cell.
 pub(super) fn sorted<const D: usize>(
     grid: &Grid<D>,
-    positions: &[Vector<f64, D>],
-    ids: Option<&[u32]>,
+    Points { positions, ids, fields, .. }: &Points<'_, D>,
     mut keys: Vec<Key>,
 ) -> Result<Vec<Key>, usize> {
     let edge = edge(D);
     let blocks: [u64; D] = std::array::from_fn(|k| u64::from(grid.cells[k]).div_ceil(edge));
     let place = |p: u32| {
         let cell = grid.cell(&positions[p as usize])?;
-        let (mut block, mut local) = (0, 0);
+        let (mut block, mut local) = (u64::from(fields.field(p as usize)), 0);
         for k in (0..D).rev() {
             let at = u64::from(cell[k]);
             block = block * blocks[k] + at / edge;

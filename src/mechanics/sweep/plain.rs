@@ -216,12 +216,12 @@ fn lists<A: ShapeFunction, const D: usize>(
         approximation
             .evaluate(grid, &points.positions[p as usize], &mut scratch, &mut support)
             .map_err(|source| SupportError { particle: points.id(p as usize), source })?;
-        let continued = points.continued.get(&p);
+        let (continued, field) = (points.continued.get(&p), points.fields.field(p as usize));
         let nodes = support.nodes.iter().zip(&support.values).zip(&support.gradients);
         let entry = |((&index, &n), &gradient): ((_, &f64), &[f64; D])| {
             let grad_n = Vector::from(gradient);
             let rise = continued.map_or(0.0, |by| grad_n.dot(by));
-            (grid.id(index), n + rise, grad_n)
+            (grid.id_in(field, index), n + rise, grad_n)
         };
         lists.push(nodes.map(entry).collect());
     }

@@ -1,5 +1,6 @@
 //! The points where shape functions are evaluated.
 
+use super::fields::Fields;
 use crate::approximation::ApproximationError;
 use crate::tensor::Vector;
 use std::borrow::Cow;
@@ -16,12 +17,14 @@ pub struct Points<'a, const D: usize> {
     /// [functions of a surface](crate::approximation::Separable::at_surface), evaluated at x and continued linearly along each axis by
     /// this vector.
     pub continued: BTreeMap<u32, Vector<f64, D>>,
+    /// The nodal fields of the particles.
+    pub fields: Fields<'a>,
 }
 
 impl<'a, const D: usize> Points<'a, D> {
     /// The particles at `positions`, none of which is on a loaded surface.
     pub fn at(positions: &'a [Vector<f64, D>]) -> Self {
-        Self { positions: positions.into(), ids: None, continued: BTreeMap::new() }
+        Self { positions: positions.into(), ids: None, continued: BTreeMap::new(), fields: Fields::default() }
     }
 
     /// The id of a particle, for messages.

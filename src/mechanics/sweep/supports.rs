@@ -46,9 +46,11 @@ const LEAPS: usize = 8;
 #[derive(Debug)]
 pub struct Supports<const D: usize> {
     pub(super) way: Way<D>,
-    grid: Grid<D>,
+    pub(super) grid: Grid<D>,
     /// Active nodes.
-    nodes: Nodes,
+    pub(super) nodes: Nodes,
+    /// The nodal field of each body; empty if there is one field.
+    pub(super) fields: Vec<u32>,
     /// Number of passes over all particles so far.
     passes: AtomicU64,
     /// Memory pool of the nodal fields.
@@ -128,11 +130,11 @@ impl<const D: usize> Supports<D> {
                     Way::Tiled(tiled) => Some(tiled),
                 });
                 let (tiled, nodes) = Tiled::new(approximation, product, grid, points, spare)?;
-                Ok((Self::of_way(Way::Tiled(tiled), grid, &nodes, pool), nodes))
+                Ok((Self::of_way(Way::Tiled(tiled), grid, &nodes, pool).with_fields(points), nodes))
             }
             _ => {
                 let (plain, nodes) = Plain::new(approximation, grid, points)?;
-                Ok((Self::of_way(Way::Plain(plain), grid, &nodes, pool), nodes))
+                Ok((Self::of_way(Way::Plain(plain), grid, &nodes, pool).with_fields(points), nodes))
             }
         }
     }
@@ -176,7 +178,7 @@ impl<const D: usize> Supports<D> {
 
     fn of_way(way: Way<D>, grid: &Grid<D>, nodes: &Nodes, pool: &Pool) -> Self {
         let (nodes, passes, pool) = (nodes.clone(), AtomicU64::new(0), pool.clone());
-        Self { way, grid: *grid, nodes, passes, pool, extension: None }
+        Self { way, grid: *grid, nodes, fields: Vec::new(), passes, pool, extension: None }
     }
 
     /// These supports with an extension u = E û: outer nodes follow inner ones, and equilibria are solved for the inner nodes alone.

@@ -48,7 +48,7 @@ impl<const D: usize> Tiled<D> {
             SupportError { particle, source }
         };
         let Self { mut blocks, mut slots, keys, mut rows, nodes } = spare.unwrap_or_default();
-        let keys = order::sorted(grid, positions, points.ids, keys).map_err(|particle| {
+        let keys = order::sorted(grid, points, keys).map_err(|particle| {
             let outside = ApproximationError::Outside { position: Vec::new(), lower: Vec::new(), upper: Vec::new() };
             failure(particle, outside)
         })?;

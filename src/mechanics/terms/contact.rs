@@ -1,45 +1,51 @@
-//! Contact with rigid obstacles, −Σ_Γ t A N_I with the traction t of [`contact`](crate::mechanics::contact). The pressure has a potential.
+//! Contact with obstacles and between bodies, −Σ_Γ t A N_I with the traction t of [`contact`](crate::mechanics::contact). The pressure has a potential.
 //! Friction has none, and its tangent is not symmetric.
 
 use super::term::{FunctionsAt, Linearized, LinearizedTerm, Step, Sum, Term, summed};
 use crate::material::{Law, p_wave_modulus, poissons_ratio};
 use crate::mechanics::constitutive::{Inadmissible, Part};
-use crate::mechanics::contact::{ContactPoint, Response, contact_points};
+use crate::mechanics::contact::{Carrier, ContactPoint, Response, Surroundings, obstacle_points, pair_points};
 use crate::mechanics::loads::Pose;
 use crate::mechanics::sweep::{Number, Supports};
 use crate::mechanics::trial::Trial;
 use crate::particles::Body;
 use crate::tensor::{Tensor, Vector};
+use std::collections::BTreeMap;
 
-/// The pressure of all obstacles, or their friction.
-pub(crate) struct ObstacleForce<'a, const D: usize, L> {
+/// The pressure of all contacts, or their friction.
+pub(crate) struct ContactForce<'a, const D: usize, L> {
     step: Step<'a, D, L>,
     response: Response,
     /// The pressure per depth of every body, for a penalty stiffness of 1.
     stiffness: Vec<f64>,
 }
 
-impl<'a, const D: usize, L: Law> ObstacleForce<'a, D, L> {
+impl<'a, const D: usize, L: Law> ContactForce<'a, D, L> {
     pub(crate) fn pressure(step: &Step<'a, D, L>) -> Option<Self> {
-        Self::of(step, Response::Pressure, !step.loads.obstacles.list.is_empty())
+        Self::of(step, Response::Pressure, step.loads.contacts.exist())
     }
 
     pub(super) fn friction(step: &Step<'a, D, L>) -> Option<Self> {
-        Self::of(step, Response::Friction, step.loads.obstacles.have_friction())
+        Self::of(step, Response::Friction, step.loads.contacts.have_friction())
     }
 
     fn of(step: &Step<'a, D, L>, response: Response, acts: bool) -> Option<Self> {
         acts.then(|| Self { step: *step, response, stiffness: penalties(step.bodies, step.supports.grid().spacing) })
     }
 
-    /// All points that touch an obstacle at Δφ.
-    pub(crate) fn contact_points<T: Number>(&self, dphi: &[Vector<T, D>]) -> Vec<ContactPoint<'a, T, D>> {
+    /// All points in contact at Δφ.
+    pub(crate) fn contact_points<T: Number>(&self, dphi: &[Vector<T, D>]) -> Vec<ContactPoint<T, D>> {
         let Step { particles, supports, loads, time, .. } = self.step;
         let reference = particles.reference().position;
-        let stiffness = |p: usize| self.stiffness[particles.body[p] as usize];
-        contact_points(&loads.obstacles, time, supports.grid().spacing, stiffness, |p| {
-            supports.value_at(p, dphi) + reference[p].map(T::lit)
-        })
+        let around = Surroundings {
+            t: time,
+            spacing: supports.grid().spacing,
+            stiffness: |p: usize| self.stiffness[particles.body[p] as usize],
+            position: |carrier: &Carrier<D>| carrier.position(reference, supports, dphi),
+        };
+        let mut found = obstacle_points(&loads.contacts, &around);
+        found.extend(pair_points(&loads.contacts, &around));
+        found
     }
 }
 
@@ -57,7 +63,7 @@ pub(crate) fn penalties<L: Law>(bodies: &[Body<L>], spacing: f64) -> Vec<f64> {
     bodies.iter().map(|body| modulus(body) / spacing).collect()
 }
 
-impl<const D: usize, L: Law> Term<D> for ObstacleForce<'_, D, L> {
+impl<const D: usize, L: Law> Term<D> for ContactForce<'_, D, L> {
     fn name(&self) -> &'static str {
         match self.response {
             Response::Pressure => "contact",
@@ -66,88 +72,107 @@ impl<const D: usize, L: Law> Term<D> for ObstacleForce<'_, D, L> {
     }
 
     fn add_at_nodes<T: Number>(&self, dphi: &[Vector<T, D>], out: &mut [Vector<T, D>]) {
-        for ContactPoint { point, pose, law, y, .. } in self.contact_points(dphi) {
-            let force = pose.rotation.map(T::lit) * law.traction(self.response, &y) * T::lit(point.area);
-            mutant!("contact: the force does not turn with the obstacle": force = law.traction(self.response, &y) * T::lit(point.area));
-            for (node, n, _) in self.step.supports.of(point.particle) {
-                out[node] -= force * T::lit(n);
+        for ContactPoint { area, pose, law, y, carriers, .. } in self.contact_points(dphi) {
+            let force = pose.rotation.map(T::lit) * law.traction(self.response, &y) * T::lit(area);
+            mutant!("contact: the force does not turn with the obstacle": force = law.traction(self.response, &y) * T::lit(area));
+            for carrier in &carriers {
+                carrier
+                    .weights(self.step.supports)
+                    .for_each(|(node, n)| out[node] -= force * T::lit(carrier.share * n));
             }
         }
     }
 
     /// Σ ½ k g² A
     fn energy<T: Number>(&self, dphi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>> {
-        let energy = |one: ContactPoint<'_, T, D>| one.law.energy(&one.y) * T::lit(one.point.area);
+        let energy = |one: ContactPoint<T, D>| one.law.energy(&one.y) * T::lit(one.area);
         (self.response == Response::Pressure).then(|| Ok(summed(self.contact_points(dphi).into_iter().map(energy))))
     }
 
     fn add_magnitudes_at_nodes(&self, dphi: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
-        for ContactPoint { point, pose, law, y, .. } in self.contact_points(dphi) {
-            let force = pose.rotation * law.traction(self.response, &y) * point.area;
-            for (node, n, _) in self.step.supports.of(point.particle) {
-                out[node] += force.abs() * n.abs();
+        for ContactPoint { area, pose, law, y, carriers, .. } in self.contact_points(dphi) {
+            let force = pose.rotation * law.traction(self.response, &y) * area;
+            for carrier in &carriers {
+                let share = carrier.share.abs();
+                carrier.weights(self.step.supports).for_each(|(node, n)| out[node] += force.abs() * (share * n.abs()));
             }
         }
     }
 
     /// The gap changes by the rounding of positions.
     fn add_sensitivity(&self, dphi: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) -> Result<(), Inadmissible> {
-        for LinearizedPoint { particle, tangent } in self.linearized(dphi) {
-            let x = self.step.particles.reference().position[particle].abs()
-                + self.step.supports.value_at(particle, dphi).abs();
-            let change = tangent.abs() * x;
-            for (node, n, _) in self.step.supports.of(particle) {
-                out[node] += change * n.abs();
+        let (supports, reference) = (self.step.supports, self.step.particles.reference().position);
+        for LinearizedPoint { carriers, tangent } in self.linearized(dphi) {
+            for Carrier { particle, share, .. } in &carriers {
+                let x = reference[*particle].abs() + supports.value_at(*particle, dphi).abs();
+                let change = tangent.abs() * x * share.powi(2);
+                supports.of(*particle).for_each(|(node, n, _)| out[node] += change * n.abs());
             }
         }
         Ok(())
     }
 
     fn linearize(&self, Trial { dphi, .. }: Trial<'_, f64, D>, _: Part) -> LinearizedTerm<'_, D> {
-        Ok(vec![Box::new(LinearizedContact { supports: self.step.supports, points: self.linearized(dphi) })])
+        Ok(vec![Box::new(LinearizedContact::new(self.linearized(dphi), self.step.supports))])
     }
 }
 
-impl<const D: usize, L: Law> ObstacleForce<'_, D, L> {
+impl<const D: usize, L: Law> ContactForce<'_, D, L> {
     fn linearized(&self, dphi: &[Vector<f64, D>]) -> Vec<LinearizedPoint<D>> {
-        let linearize = |ContactPoint { point, pose: Pose { rotation, .. }, law, y, .. }: ContactPoint<'_, f64, D>| {
-            let tangent = rotation * law.tangent(self.response, &y) * rotation.transpose() * point.area;
-            mutant!("contact: the tangent does not turn with the obstacle": tangent = law.tangent(self.response, &y) * point.area);
-            LinearizedPoint { particle: point.particle, tangent }
+        let linearize = |ContactPoint { area, pose: Pose { rotation, .. }, law, y, carriers, .. }: ContactPoint<
+            f64,
+            D,
+        >| {
+            let tangent = rotation * law.tangent(self.response, &y) * rotation.transpose() * area;
+            mutant!("contact: the tangent does not turn with the obstacle": tangent = law.tangent(self.response, &y) * area);
+            LinearizedPoint { carriers, tangent }
         };
         self.contact_points(dphi).into_iter().map(linearize).collect()
     }
 }
 
-struct LinearizedContact<'a, const D: usize> {
-    supports: &'a Supports<D>,
+struct LinearizedContact<const D: usize> {
     points: Vec<LinearizedPoint<D>>,
+    /// For each point, the nodes that move it and their weights.
+    weights: Vec<Vec<(usize, f64)>>,
 }
 
-/// −∂(t A)/∂x of a point that touches an obstacle.
+/// −∂(t A)/∂x of a point in contact.
 struct LinearizedPoint<const D: usize> {
-    particle: usize,
+    carriers: Vec<Carrier<D>>,
     tangent: Tensor<f64, D>,
 }
 
-impl<const D: usize> Linearized<D> for LinearizedContact<'_, D> {
+impl<const D: usize> LinearizedContact<D> {
+    fn new(points: Vec<LinearizedPoint<D>>, supports: &Supports<D>) -> Self {
+        let of = |carrier: &Carrier<D>| {
+            carrier.weights(supports).map(|(node, n)| (node, carrier.share * n)).collect::<Vec<_>>()
+        };
+        let weights = points.iter().map(|point| point.carriers.iter().flat_map(of).collect()).collect();
+        Self { points, weights }
+    }
+}
+
+impl<const D: usize> Linearized<D> for LinearizedContact<D> {
     fn add_product_at_nodes(&self, u: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
-        for LinearizedPoint { particle, tangent } in &self.points {
-            let force = tangent * self.supports.value_at(*particle, u);
-            for (node, n, _) in self.supports.of(*particle) {
-                out[node] += force * n;
-            }
+        for (LinearizedPoint { tangent, .. }, weights) in self.points.iter().zip(&self.weights) {
+            let force = tangent * weights.iter().fold(Vector::zeros(), |sum, &(node, n)| sum + u[node] * n);
+            weights.iter().for_each(|&(node, n)| out[node] += force * n);
         }
     }
 
-    /// N_I² K
+    /// W_I² K, with the sum W_I over all places that the node moves
     fn add_blocks_of_functions(&self, functions: &FunctionsAt<'_, D>, blocks: &mut [Tensor<f64, D>]) {
-        for LinearizedPoint { particle, tangent } in &self.points {
-            for (node, function) in functions(*particle) {
-                for k in 0..D {
-                    (0..D)
-                        .for_each(|i| blocks[node][(i, k)] += function.value[i] * tangent[(i, k)] * function.value[k]);
+        for LinearizedPoint { carriers, tangent } in &self.points {
+            let mut of_node: BTreeMap<usize, [f64; D]> = BTreeMap::new();
+            for Carrier { particle, share, offset } in carriers {
+                for (node, function) in functions(*particle) {
+                    let sum = of_node.entry(node).or_insert([0.0; D]);
+                    (0..D).for_each(|i| sum[i] += share * (function.value[i] + function.gradient[i].dot(offset)));
                 }
+            }
+            for (node, w) in of_node {
+                blocks[node] += Tensor::from_fn(|i, k| w[i] * tangent[(i, k)] * w[k]);
             }
         }
     }

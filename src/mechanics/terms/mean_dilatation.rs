@@ -249,6 +249,7 @@ impl<const D: usize, L: Law> LinearizedMean<'_, D, L> {
             }
             let bulk = (state.stiffness * volume).max(SOFTEST * scale.shear);
             MixedCell {
+                field: supports.field_of(particles.body[members[0].particle as usize]),
                 index: grid.cell(&reference.position[members[0].particle as usize]).unwrap_or([0; D]),
                 centroid,
                 volume,

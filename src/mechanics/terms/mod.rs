@@ -19,7 +19,7 @@ mod pressure;
 mod stress;
 mod term;
 
-pub(crate) use contact::{ObstacleForce, penalties};
+pub(crate) use contact::{ContactForce, penalties};
 pub(crate) use mean_dilatation::linearized_rows;
 pub(crate) use planned::planned;
 pub(crate) use term::{Along, Linearized, MixedCell, MixedCells};
@@ -48,7 +48,7 @@ pub(crate) enum AnyTerm<'a, const D: usize, L> {
     Damping(Damping<'a, D, L>),
     DeadLoad(DeadLoad<D>),
     Pressure(Pressure<'a, D>),
-    ObstacleForce(ObstacleForce<'a, D, L>),
+    ContactForce(ContactForce<'a, D, L>),
 }
 
 /// The value of an expression for a term of any type. A term has methods that are generic over the number type, so it cannot be `dyn`.
@@ -61,7 +61,7 @@ macro_rules! of_term {
             AnyTerm::Damping($term) => $value,
             AnyTerm::DeadLoad($term) => $value,
             AnyTerm::Pressure($term) => $value,
-            AnyTerm::ObstacleForce($term) => $value,
+            AnyTerm::ContactForce($term) => $value,
         }
     };
 }
@@ -81,8 +81,8 @@ impl<'a, const D: usize, L: Law> Terms<'a, D, L> {
             DeadLoad::traction(step).map(AnyTerm::DeadLoad),
             DeadLoad::out_of_balance(step).map(AnyTerm::DeadLoad),
             Pressure::of(step).map(AnyTerm::Pressure),
-            ObstacleForce::pressure(step).map(AnyTerm::ObstacleForce),
-            ObstacleForce::friction(step).map(AnyTerm::ObstacleForce),
+            ContactForce::pressure(step).map(AnyTerm::ContactForce),
+            ContactForce::friction(step).map(AnyTerm::ContactForce),
         ];
         Self(terms.into_iter().flatten().collect())
     }

@@ -31,8 +31,9 @@ pub(crate) fn planned<const D: usize>(
     };
     let pulled = loads.loaded(|pressing| matches!(pressing, Pressing::Traction(_)));
     let pressed = loads.loaded(|pressing| matches!(pressing, Pressing::Pressure(_)));
-    let (points, obstacles) = (loads.obstacles.points.len(), loads.obstacles.list.len());
-    let touched = format!("{points} points of surfaces; obstacles: {obstacles}");
+    let (points, obstacles) = (loads.contacts.points.len(), loads.contacts.obstacles.len());
+    let pairs = loads.contacts.between.as_ref().map_or(0, |between| between.pairs.len());
+    let touched = format!("{points} points of surfaces; obstacles: {obstacles}; pairs of bodies: {pairs}");
     vec![
         ("inertia, lumped", moves && lumping > 0.0, inertia(format!("time.lumping = {lumping}, {scheme}"))),
         (
@@ -47,11 +48,11 @@ pub(crate) fn planned<const D: usize>(
         ("tractions", pulled > 0, format!("{pulled} loaded particles")),
         ("out-of-balance force", may_reset && !moves, "after a grid reset in load steps".into()),
         ("follower pressure", pressed > 0, format!("{pressed} loaded particles; makes the tangent unsymmetric")),
-        ("contact with obstacles", !loads.obstacles.list.is_empty(), touched),
+        ("contact", loads.contacts.exist(), touched),
         (
             "friction",
-            loads.obstacles.have_friction(),
-            "only at obstacles with friction; makes the tangent unsymmetric".into(),
+            loads.contacts.have_friction(),
+            "only where contact has friction; makes the tangent unsymmetric".into(),
         ),
     ]
 }

@@ -177,6 +177,8 @@ pub(crate) trait MixedCells<const D: usize>: Sync {
 /// A cell at one trial state.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MixedCell<const D: usize> {
+    /// The nodal field of the cell.
+    pub field: u32,
     /// The index of the cell in the grid.
     pub index: [u32; D],
     /// The centroid of the particles.

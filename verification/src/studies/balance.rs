@@ -77,7 +77,7 @@ fn block<const D: usize>(shape: &Approximation, lumping: f64) -> Result<Simulati
     };
     let law = Material::from(NeoHookean::ciarlet(Lame::from_young_poisson(1000.0, 0.3)?));
     let grid = Grid { origin: Vector::zeros(), spacing: SPACING, cells: [12; D] };
-    let bodies = vec![Body { name: "block".into(), law, density: DENSITY, dilatation: Default::default() }];
+    let bodies = vec![Body { name: "block".into(), law, density: DENSITY, dilatation: Default::default(), field: 0 }];
     Ok(Simulation { loads, settings: Settings {
             lumping,
             initial_guess: InitialGuess::Velocity,

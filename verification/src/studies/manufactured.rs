@@ -129,7 +129,7 @@ fn simulate<P: Problem>(
     } else {
         Vec::new()
     };
-    let bodies = vec![Body { name: "body".into(), law: law.clone(), density, dilatation: Default::default() }];
+    let bodies = vec![Body { name: "body".into(), law: law.clone(), density, dilatation: Default::default(), field: 0 }];
     let mut simulation = Simulation { loads: Loads {
             prescribed,
             field: Some(force_field(*problem, law, density, reference.clone())),

@@ -213,7 +213,7 @@ fn patch_test<const D: usize>(name: &str, shape: &Approximation, report: &mut Re
     let h = Random::new(37).tensor::<D>() * 0.3;
     let at = MaterialState::new(h);
     let stress = volume * (at.f * law.stress(&at) * at.f.transpose()).norm();
-    let bodies = [Body { name: "patch".into(), law, density: 1.0, dilatation: Default::default() }];
+    let bodies = [Body { name: "patch".into(), law, density: 1.0, dilatation: Default::default(), field: 0 }];
     for (layout, label) in Layout::ALL {
         let mut particles = Particles::default();
         layout.particles(first, count).into_iter().for_each(|x| particles.push_without_inertia(x, volume, volume, 0));
@@ -254,7 +254,7 @@ pub(super) fn spinning(shape: &Approximation, lumping: f64, dt: f64) -> Result<S
     }
     let law = Material::from(NeoHookean::ciarlet(Lame::new(15.0, 10.0)?));
     let grid = Grid { origin: Vector::zeros(), spacing: 1.0, cells: [12, 12] };
-    let bodies = vec![Body { name: "square".into(), law, density: 4.0, dilatation: Default::default() }];
+    let bodies = vec![Body { name: "square".into(), law, density: 4.0, dilatation: Default::default(), field: 0 }];
     Ok(Simulation { settings: Settings {
             lumping,
             initial_guess: InitialGuess::Velocity,

@@ -202,7 +202,7 @@ pub(super) fn cloud<const D: usize, L: Law>(
     let mut motion = std::array::from_fn(|_| None);
     motion[0] = Some(Motion::Rest);
     let grid = Grid { origin: Vector::zeros(), spacing: SPACING, cells: [6; D] };
-    let bodies = vec![Body { name: "cloud".into(), law, density, dilatation: Default::default() }];
+    let bodies = vec![Body { name: "cloud".into(), law, density, dilatation: Default::default(), field: 0 }];
     Ok(Simulation { loads: Loads {
             gravity: Some(Gravity { acceleration: random.vector() * (speed / dt), curve: Curve::constant(1.0) }),
             surface: vec![SurfaceLoad {

@@ -4,15 +4,16 @@
 
 use super::{Effort, StudyError, built};
 use crate::report::{Bound, Report};
+use bfree::simulation::Simulation;
 use serde_json::{Value, json};
 
-const GRAVITY: f64 = 10.0;
+pub(super) const GRAVITY: f64 = 10.0;
 
 /// The time over which the acceleration is measured, and the time before it.
 const TIMES: [f64; 2] = [0.2, 0.8];
 
 /// A body on the floor y = 1, under gravity at an angle of `degrees` to the normal of the floor.
-fn scene(shape: Value, degrees: f64, friction: f64) -> Value {
+pub(super) fn scene(shape: Value, degrees: f64, friction: f64) -> Value {
     let angle = degrees.to_radians();
     json!({
         "grid": { "size": [5, 2.5], "spacing": 0.125 },
@@ -24,14 +25,18 @@ fn scene(shape: Value, degrees: f64, friction: f64) -> Value {
 }
 
 /// The mean acceleration along the floor between the two times.
-fn acceleration(scene: &Value) -> Result<f64, StudyError> {
+pub(super) fn acceleration(scene: &Value) -> Result<f64, StudyError> {
     let mut simulation = built::<2>(scene)?;
-    let mass: f64 = simulation.particles.mass.iter().sum();
+    let own = |simulation: &Simulation<2>| (0..simulation.particles.len()).filter(|&p| simulation.particles.body[p] == 0).collect::<Vec<_>>();
     let [start, end] = TIMES.map(|until| -> Result<[f64; 2], StudyError> {
         while simulation.clock.time() < until - 1e-9 {
             simulation.advance()?;
         }
-        Ok([simulation.clock.time(), simulation.particles.momentum()[0] / mass])
+        // Of the first body alone. Particles may have been rearranged.
+        let particles = &simulation.particles;
+        let sum = |of: &dyn Fn(usize) -> f64| own(&simulation).into_iter().map(of).sum::<f64>();
+        let (mass, momentum) = (sum(&|p| particles.mass[p]), sum(&|p| particles.mass[p] * particles.velocity[p][0]));
+        Ok([simulation.clock.time(), momentum / mass])
     });
     let ([t, v], [start_t, start_v]) = (end?, start?);
     Ok((v - start_v) / (t - start_t))

@@ -1,6 +1,7 @@
-//! Contact with rigid obstacles: the tangent of every state of contact against dual numbers, and forces and motions against exact answers.
+//! Contact with rigid obstacles and between bodies: the tangent of every state of contact against dual numbers, and forces and motions against exact answers.
 
 mod bar;
+mod between;
 mod incline;
 mod indentation;
 mod tangent;
@@ -11,13 +12,16 @@ use bfree::simulation::Simulation;
 use serde_json::Value;
 
 /// The summary in the list of studies.
-pub(super) const ABOUT: &str = "contact with obstacles: tangent, impact of a bar, sliding and rolling, a wedge, patch test, Hertz";
+pub(super) const ABOUT: &str = "contact with obstacles and between bodies: tangent, impact of bars, sliding and rolling, a wedge, patch test, Hertz, discs";
 
 pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     let mut reports = tangent::reports()?;
     let (of_bar, table) = bar::report(effort)?;
     reports.push(of_bar);
+    reports.push(between::impact(effort)?);
     reports.push(incline::report(effort)?);
+    reports.push(between::slope(effort)?);
+    reports.push(between::mirrored()?);
     reports.push(wedge::report(effort)?);
     reports.push(indentation::patch()?);
     if *effort == Effort::Full {

@@ -10,7 +10,7 @@ use crate::studies::StudyError;
 use crate::studies::tangent::{SPACING, cloud};
 use bfree::approximation::{Approximation, Bspline};
 use bfree::material::{Lame, NeoHookean};
-use bfree::mechanics::loads::{Curve, Motion, Obstacle, Rotation};
+use bfree::mechanics::loads::{BodyContact, Curve, Facing, Motion, Obstacle, Partner, Rotation};
 use bfree::shape::{Ball, Block, Cone, HalfSpace, Shape};
 use bfree::simulation::Simulation;
 use bfree::tensor::Vector;
@@ -45,9 +45,14 @@ fn dimension<const D: usize>(report: &mut Report) -> Result<(), StudyError> {
     let mut random = Random::new(3);
     let approximation = Approximation::from(Bspline::Cubic);
     let mut simulation: Simulation<D, NeoHookean> = cloud(law, approximation, Regime::Moderate, &mut random)?;
-    simulation.loads.obstacles.points = std::mem::take(&mut simulation.loads.surface).remove(0).points;
-    let points = simulation.loads.obstacles.points.clone();
+    simulation.loads.contacts.points = std::mem::take(&mut simulation.loads.surface).remove(0).points;
+    let points = simulation.loads.contacts.points.clone();
     let middle = simulation.particles.position[points[points.len() / 2].particle];
+    for (name, friction, slip) in STATES.into_iter().take(if D == 1 { 1 } else { STATES.len() }) {
+        simulation.loads.contacts.between = Some(between(&simulation, friction, slip, &mut random));
+        push(report, &simulation, ["another body", name, "at rest"], slip, &mut random)?;
+    }
+    simulation.loads.contacts.between = None;
     for (shape, solid) in shapes(&middle) {
         for turned in [false, true] {
             if D == 1 && turned {
@@ -61,25 +66,62 @@ fn dimension<const D: usize>(report: &mut Report) -> Result<(), StudyError> {
                 let near = |at: usize| pose.to_frame(&simulation.particles.position[at]);
                 obstacle.anchors =
                     points.iter().map(|point| near(point.particle) + random.vector() * (slip * SPACING)).collect();
-                simulation.loads.obstacles.list = vec![obstacle];
-                let prepared = Prepared::new(&simulation)?;
-                let size = if slip < 0.1 { 1e-4 } else { 1e-2 };
-                let mut dphi: Vec<Vector<f64, D>> =
-                    random.field(prepared.nodes.len()).iter().map(|x| x * (size * SPACING)).collect();
-                prepared.prescribe(&mut dphi);
-                let equilibrium = prepared.equilibrium(&simulation);
-                for measured in measure(&equilibrium, &dphi, SPACING, &mut random)? {
-                    let of_contact = ["contact", "friction", "whole product", "diagonal blocks"];
-                    if of_contact.contains(&measured.quantity.as_str()) {
-                        let way = if turned { "turned" } else { "at rest" };
-                        let labels = [&measured.quantity, shape, &D.to_string(), name, way];
-                        report.push(&labels, measured.value, measured.bound);
-                    }
-                }
+                simulation.loads.contacts.obstacles = vec![obstacle];
+                let way = if turned { "turned" } else { "at rest" };
+                push(report, &simulation, [shape, name, way], slip, &mut random)?;
             }
         }
     }
     Ok(())
+}
+
+/// Measures the tangent at a random motion that keeps the state of friction.
+fn push<const D: usize>(
+    report: &mut Report,
+    simulation: &Simulation<D, NeoHookean>,
+    [what, state, way]: [&str; 3],
+    slip: f64,
+    random: &mut Random,
+) -> Result<(), StudyError> {
+    let prepared = Prepared::new(simulation)?;
+    let size = if slip < 0.1 { 1e-4 } else { 1e-2 };
+    let mut dphi: Vec<Vector<f64, D>> =
+        random.field(prepared.nodes.len()).iter().map(|x| x * (size * SPACING)).collect();
+    prepared.prescribe(&mut dphi);
+    let equilibrium = prepared.equilibrium(simulation);
+    for measured in measure(&equilibrium, &dphi, SPACING, random)? {
+        let of_contact = ["contact", "friction", "whole product", "diagonal blocks"];
+        if of_contact.contains(&measured.quantity.as_str()) {
+            let labels = [&measured.quantity, what, &D.to_string(), state, way];
+            report.push(&labels, measured.value, measured.bound);
+        }
+    }
+    Ok(())
+}
+
+/// Every point faces the points after and before it, which carry a place at a depth of 0.05 spacings below it.
+fn between<const D: usize>(
+    simulation: &Simulation<D, NeoHookean>,
+    friction: f64,
+    slip: f64,
+    random: &mut Random,
+) -> BodyContact<D> {
+    let points = &simulation.loads.contacts.points;
+    let x = |number: usize| simulation.particles.position[points[number].particle];
+    let mut between = BodyContact::new(1.0, friction, &[0, 1]);
+    for number in 0..points.len() {
+        let normal = random.vector::<D>().normalize();
+        let start = normal * (-0.05 * SPACING);
+        let [after, before] = [(number + 1) % points.len(), (number + points.len() - 1) % points.len()];
+        let of_before = Partner { number: before, share: 0.6, offset: random.vector() * (0.2 * SPACING) };
+        let rest = x(number) - start - (x(before) + of_before.offset) * of_before.share;
+        let of_after = Partner { number: after, share: 0.4, offset: rest / 0.4 - x(after) };
+        between.facing.push(Facing { number, pair: 0, is_first: true, normal, start, partners: vec![of_after, of_before] });
+        if friction > 0.0 {
+            between.slips.push(random.vector() * (slip * SPACING));
+        }
+    }
+    between
 }
 
 /// A turn by a third of a radian in the first step.

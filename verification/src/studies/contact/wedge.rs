@@ -48,7 +48,7 @@ pub(super) fn report(effort: &Effort) -> Result<Report, StudyError> {
         }
         let labels = [stiffness.to_string(), young.to_string()];
         report.push(&[&labels[0], &labels[1], "force"], (force / exact - 1.0).abs(), Bound::AtMost(1e-3));
-        let [wedge, plate] = &simulation.loads.obstacles.list[..] else { return Err("two obstacles".into()) };
+        let [wedge, plate] = &simulation.loads.contacts.obstacles[..] else { return Err("two obstacles".into()) };
         // The block is compressed, enters the plate, and slips by ε before it slides.
         let before = EPSILON * SPACING + exact / (young * HEIGHT) + depth;
         let friction = WEIGHT * FRICTION * angle.cos();

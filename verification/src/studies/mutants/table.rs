@@ -50,6 +50,7 @@ const BONDS: Check = Check::Test("contact::");
 const RESTARTS: Check = Check::Test("restart::");
 const TOUCHES: Check = Check::Study("contact");
 const OBSTACLES: Check = Check::Test("obstacles::");
+const BETWEEN: Check = Check::Test("between::");
 const SOLVER: Check = Check::Unit("solver::");
 const SOLIDS: Check = Check::Unit("shape::");
 const STORED: Check = Check::Unit("checkpoint::");
@@ -99,6 +100,10 @@ pub(super) const FAULTS: &[ShippedFault] = &[
     fault("contact: the tangent does not turn with the obstacle", TOUCHES, OBSTACLES),
     fault("contact: the force does not turn with the obstacle", TOUCHES, OBSTACLES),
     fault("contact: an obstacle pulls", OBSTACLES, LAWS),
+    fault("contact: the other body has no reaction", BETWEEN, OBSTACLES),
+    fault("contact: the reaction acts beside the point", BETWEEN, OBSTACLES),
+    fault("contact: the reaction acts where the point was", BETWEEN, OBSTACLES),
+    fault("contact: bodies forget their slip", BETWEEN, OBSTACLES),
     fault("contact: friction pushes forwards", OBSTACLES, LAWS),
     fault("contact: the slip is not along the surface", TOUCHES, LAWS),
     fault("contact: a slip does not move the anchor", OBSTACLES, LAWS),

@@ -100,7 +100,7 @@ impl<M: Motion<D> + Copy + Send + 'static, const D: usize> Held<M, D> {
             ..Loads::default()
         };
         let settings = Settings { initial_guess: InitialGuess::LastStep, ..settings };
-        let bodies = vec![Body { name: "body".into(), law, density: 1.0, dilatation: Default::default() }];
+        let bodies = vec![Body { name: "body".into(), law, density: 1.0, dilatation: Default::default(), field: 0 }];
         let clock = Clock::new(dt, 0);
         let simulation =
             Simulation { loads, settings, ..Simulation::new(grid, shape.clone(), bodies, particles, clock) };

@@ -1,0 +1,64 @@
+//! Contact between bodies.
+
+use super::obstacle::{check_law, default_stiffness, too_stiff};
+use crate::problems::Problems;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
+
+/// Contact between bodies. Bodies then move in separate nodal fields. Their surfaces meet without adhesion where they touch, with a one-sided
+/// penalty and Coulomb friction. Force, moment, area, depth and friction loss of every pair in contact are in `contacts.csv`. A body does not
+/// touch itself.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Contact {
+    /// The coefficient of friction, 0 to 100. The tangent with friction is exact and unsymmetric. Default: 0.
+    #[serde(default)]
+    #[schemars(range(min = 0, max = 100))]
+    pub friction: f64,
+    /// The penalty stiffness, > 0: the pressure at a depth of one grid spacing, in units of Λ + 2G of the softer body, or of 4G where that is
+    /// less. Default: 1.
+    #[serde(default = "default_stiffness")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub stiffness: f64,
+    /// Groups of names of bodies. Bodies of a group share one nodal field, and stick to each other where they share nodes. A body in no group
+    /// is a group of its own.
+    #[serde(default)]
+    pub groups: Vec<Vec<String>>,
+}
+
+impl Contact {
+    pub(super) fn check(&self, problems: &mut Problems, names: &[&str], dimension: usize) {
+        check_law(problems, "contact", self.friction, self.stiffness, dimension);
+        let mut seen = BTreeSet::new();
+        for (i, group) in self.groups.iter().enumerate() {
+            for (j, name) in group.iter().enumerate() {
+                let path = format!("contact.groups[{i}][{j}]");
+                let allowed = format!("must be the name of a body: {}", names.join(", "));
+                problems.require(names.contains(&name.as_str()), &path, format_args!("{name:?}"), allowed);
+                let allowed = "must be in one group only";
+                problems.require(seen.insert(name), &path, format_args!("{name:?}"), allowed);
+            }
+        }
+        let apart = self.fields(names).iter().any(|field| *field > 0);
+        let allowed = "must leave two groups that can touch: add a body, split the group, or remove the key";
+        problems.require(apart, "contact", "one group of bodies", allowed);
+    }
+
+    /// A warning about a stiffness that gains nothing.
+    pub(super) fn warning(&self) -> Option<String> {
+        too_stiff("contact", self.stiffness)
+    }
+
+    /// The nodal field of each body, from 0 in the order of the bodies.
+    pub(super) fn fields(&self, names: &[&str]) -> Vec<u32> {
+        let group = |name: &str| self.groups.iter().position(|group| group.iter().any(|one| one == name));
+        let mut fields: Vec<u32> = Vec::new();
+        for (i, name) in names.iter().enumerate() {
+            let earlier = (0..i).find(|&j| group(name).is_some() && group(names[j]) == group(name));
+            let new = fields.iter().max().map_or(0, |last| last + 1);
+            fields.push(earlier.map_or(new, |j| fields[j]));
+        }
+        fields
+    }
+}

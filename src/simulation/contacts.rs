@@ -1,0 +1,385 @@
+//! Contact with obstacles and between bodies at the end of a step: forces, work, friction loss, and the new state of friction.
+
+use super::{Simulation, StepError};
+use crate::approximation::ShapeFunction;
+use crate::material::Law;
+use crate::mechanics::contact::{Carrier, ContactPoint, Response, Surroundings, Touching, obstacle_points};
+use crate::mechanics::facing::{DEEPEST, REACH, facing};
+use crate::mechanics::loads::{Contacts, Facing, Obstacle, Pose};
+use crate::mechanics::terms::{ContactForce, Step, penalties};
+use crate::shape::Shape;
+use crate::tensor::Vector;
+use nalgebra::Vector3;
+use std::collections::HashMap;
+
+/// A point may enter an obstacle or another body in one step by this many spacings at most. A longer step is repeated with half its length.
+const DEEPEST_ENTRY: f64 = 0.25;
+
+/// The path of a point in a step is tested for obstacles at places this far apart, in spacings, and at this many places at most.
+const SAMPLED: f64 = 0.05;
+const MOST_SAMPLES: f64 = 1000.0;
+
+/// The contact of all bodies with one obstacle, or of a pair of bodies, at the end of a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactForces<const D: usize> {
+    /// The force on the obstacle, or on the second body of the pair, at t_{n+1}.
+    pub force: Vector<f64, D>,
+    /// The moment of the force. In 2D the moment is the last component. For an obstacle, it is about the middle of its bounding box, which
+    /// moves with the obstacle; an unbounded obstacle has its moment about the origin of its frame. For a pair, it is about the origin.
+    pub moment: [f64; 3],
+    /// The reference area of contact.
+    pub area: f64,
+    /// The largest depth of a point in the obstacle or in the other body (length).
+    pub depth: f64,
+    /// The work of the moving obstacle on the bodies since the start; 0 for a pair.
+    pub work: f64,
+    /// The energy dissipated by friction since the start.
+    pub friction_loss: f64,
+}
+
+/// The changes at all contacts in a step.
+#[derive(Debug, Default)]
+pub(super) struct ContactUpdate<const D: usize> {
+    pub obstacles: Vec<ContactForces<D>>,
+    pub pairs: Vec<ContactForces<D>>,
+    /// The new anchors of friction, by obstacle.
+    anchors: Vec<Vec<Vector<f64, D>>>,
+    /// The new slips between bodies, by point.
+    slips: Vec<Vector<f64, D>>,
+    /// The energy stored in the contact between bodies.
+    energy: f64,
+    /// The work of all obstacles in the step.
+    pub work: f64,
+    /// The friction loss of all contacts in the step.
+    pub friction_loss: f64,
+}
+
+impl<const D: usize> ContactForces<D> {
+    /// No contact yet.
+    pub(crate) const NONE: Self = Self {
+        force: Vector::from_array_storage(nalgebra::ArrayStorage([[0.0; D]])),
+        moment: [0.0; 3],
+        area: 0.0,
+        depth: 0.0,
+        work: 0.0,
+        friction_loss: 0.0,
+    };
+}
+
+impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
+    /// Finds the points that may touch another body in the coming step.
+    pub(super) fn find_facing(&mut self) {
+        let contacts = &self.loads.contacts;
+        if let Some(between) = &contacts.between {
+            let found = facing(contacts, between, &self.particles, &self.grid, self.clock.step());
+            self.loads.contacts.between.as_mut().into_iter().for_each(|between| between.facing.clone_from(&found));
+        }
+    }
+
+    /// The contact at the end of a step, with the nodal motion `phi` since the last grid reset.
+    ///
+    /// # Errors
+    /// A point enters an obstacle or another body too deeply, or goes through it.
+    pub(super) fn contact_update(
+        &self,
+        step: &Step<'_, D, L>,
+        phi: &[Vector<f64, D>],
+    ) -> Result<ContactUpdate<D>, StepError> {
+        let contacts = &self.loads.contacts;
+        if !contacts.exist() {
+            return Ok(ContactUpdate::default());
+        }
+        let end = Step { time: self.load() + self.clock.step(), ..*step };
+        let motion = Motion {
+            poses: [self.poses(self.load()), self.poses(end.time)],
+            positions: self.point_positions(step, phi),
+            relative: self.relative_motions(step, phi),
+        };
+        self.check_entry(&motion.poses, &motion.positions)?;
+        self.check_overlap(&motion)?;
+        let mut update = self.untouched(&motion);
+        for one in &points_at(&end, phi) {
+            update.add_end(one, contacts, &motion);
+            update.add_work(one, &motion, &self.ends(one, &motion.positions));
+        }
+        let before: Vec<_> = step.nodal.moved(step.supports.nodes()).collect();
+        let start = Step { time: self.load(), ..*step };
+        for one in points_at(&start, &before) {
+            mutant!("obstacles: the forces at the start of a step do no work": { break; });
+            update.add_work(&one, &motion, &self.ends(&one, &motion.positions));
+        }
+        Ok(update)
+    }
+
+    /// The update of a step in which nothing touches.
+    fn untouched(&self, motion: &Motion<D>) -> ContactUpdate<D> {
+        let contacts = &self.loads.contacts;
+        let since = |work, friction_loss| ContactForces { work, friction_loss, ..ContactForces::NONE };
+        let pairs = contacts.between.iter().flat_map(|between| &between.pairs);
+        let slips = contacts.between.as_ref().map_or(0, |between| between.slips.len());
+        let anchors = contacts.obstacles.iter().zip(&motion.poses[1]);
+        ContactUpdate {
+            obstacles: contacts.obstacles.iter().map(|one| since(one.work, one.friction_loss)).collect(),
+            pairs: pairs.map(|pair| since(0.0, pair.friction_loss)).collect(),
+            anchors: anchors.map(|(one, pose)| free_anchors(one, pose, &motion.positions)).collect(),
+            slips: vec![Vector::zeros(); slips],
+            ..ContactUpdate::default()
+        }
+    }
+
+    /// For each facing point, its motion in the step relative to the other body: the positions at both ends.
+    fn relative_motions(&self, step: &Step<'_, D, L>, phi: &[Vector<f64, D>]) -> HashMap<usize, [Vector<f64, D>; 2]> {
+        let (contacts, reference) = (&self.loads.contacts, self.particles.reference().position);
+        let facing = contacts.between.iter().flat_map(|between| &between.facing);
+        let of = |one: &Facing<D>| {
+            let position = |carrier: &Carrier<D>| carrier.position(reference, step.supports, phi) * carrier.share;
+            (one.number, [one.start, one.carriers(contacts).iter().map(position).sum()])
+        };
+        facing.map(of).collect()
+    }
+
+    /// Refuses a step in which a point enters another body too deeply, or in which a body may have gone through another one.
+    fn check_overlap(&self, motion: &Motion<D>) -> Result<(), StepError> {
+        let contacts = &self.loads.contacts;
+        let Some(between) = &contacts.between else { return Ok(()) };
+        let h = self.grid.spacing;
+        let body_of = |number: usize| self.particles.body[contacts.points[number].particle];
+        let start = |number: usize| self.particles.position[contacts.points[number].particle];
+        let refused = |number: usize, pair: usize, depth: f64| {
+            let own = body_of(number);
+            let other = between.pairs[pair].bodies.into_iter().find(|&body| body != own).unwrap_or(own);
+            let names = [own, other].map(|body| self.bodies[body as usize].name.clone());
+            StepError::EntersBody { bodies: names, position: start(number).iter().copied().collect(), depth }
+        };
+        for one in &between.facing {
+            let depth = -one.normal.dot(&motion.relative[&one.number][1]) / h;
+            if depth > DEEPEST || depth - (-one.normal.dot(&one.start) / h).max(0.0) > DEEPEST_ENTRY {
+                return Err(refused(one.number, one.pair, depth));
+            }
+        }
+        // The search has seen what is within its reach, so nothing may come from farther away.
+        let boxes = self.boxes(&motion.positions);
+        for (number, pair) in between.pairs.iter().enumerate() {
+            let [Some(one), Some(other)] = pair.bodies.map(|body| boxes[body as usize]) else { continue };
+            let meet = (0..D).all(|k| one.low[k] <= other.high[k] && other.low[k] <= one.high[k]);
+            let apart = one.motion - other.motion;
+            if meet && apart.norm() + one.spread + other.spread > f64::from(REACH) * h {
+                let own = |at: &usize| body_of(*at) == pair.bodies[0];
+                let first = (0..contacts.points.len()).find(own).unwrap_or(0);
+                return Err(refused(first, number, f64::from(REACH)));
+            }
+        }
+        Ok(())
+    }
+
+    /// The boxes through which the surfaces of all bodies move in the step; `None` for a body without surface points.
+    fn boxes(&self, positions: &[Vector<f64, D>]) -> Vec<Option<Swept<D>>> {
+        let mut boxes: Vec<Option<Swept<D>>> = vec![None; self.bodies.len()];
+        for (point, end) in self.loads.contacts.points.iter().zip(positions) {
+            let start = &self.particles.position[point.particle];
+            let (low, high, motion) = (start.inf(end), start.sup(end), end - start);
+            let swept = boxes[self.particles.body[point.particle] as usize];
+            let new = Swept { low, high, motion, spread: 0.0 };
+            boxes[self.particles.body[point.particle] as usize] = Some(swept.map_or(new, |swept| Swept {
+                low: swept.low.inf(&low),
+                high: swept.high.sup(&high),
+                motion: swept.motion,
+                spread: swept.spread.max((motion - swept.motion).norm()),
+            }));
+        }
+        boxes
+    }
+
+    /// The positions of all points at the end of the step.
+    fn point_positions(&self, step: &Step<'_, D, L>, phi: &[Vector<f64, D>]) -> Vec<Vector<f64, D>> {
+        let reference = self.particles.reference().position;
+        let at = |p: usize| reference[p] + step.supports.value_at(p, phi);
+        self.loads.contacts.points.iter().map(|point| at(point.particle)).collect()
+    }
+
+    /// The positions of a point at both ends of the step.
+    fn ends(&self, one: &ContactPoint<f64, D>, positions: &[Vector<f64, D>]) -> [Vector<f64, D>; 2] {
+        [self.particles.position[one.carriers[0].particle], positions[one.number]]
+    }
+
+    /// The poses of all obstacles at a time.
+    fn poses(&self, time: f64) -> Vec<Pose<D>> {
+        self.loads.contacts.obstacles.iter().map(|one| one.pose(time)).collect()
+    }
+
+    /// Refuses a step in which a point enters an obstacle too deeply, or goes through an obstacle.
+    fn check_entry(&self, poses: &[Vec<Pose<D>>; 2], positions: &[Vector<f64, D>]) -> Result<(), StepError> {
+        let (contacts, h) = (&self.loads.contacts, self.grid.spacing);
+        mutant!("obstacles: a point may enter deeply in one step": { return Ok(()); });
+        for (point, end) in contacts.points.iter().zip(positions) {
+            let start = &self.particles.position[point.particle];
+            for (number, obstacle) in contacts.obstacles.iter().enumerate() {
+                let ends = [poses[0][number].to_frame(start), poses[1][number].to_frame(end)];
+                if let Some(depth) = entry(&obstacle.shape, &ends, h) {
+                    let position = start.iter().copied().collect();
+                    return Err(StepError::EntersObstacle { obstacle: obstacle.name.clone(), position, depth });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes the state of friction, the work and the losses.
+    pub(super) fn accept_contacts(&mut self, update: &ContactUpdate<D>) {
+        mutant!("obstacles: the state of friction is not kept": { return; });
+        let list = self.loads.contacts.obstacles.iter_mut();
+        for ((obstacle, contact), anchors) in list.zip(&update.obstacles).zip(&update.anchors) {
+            obstacle.anchors.clone_from(anchors);
+            (obstacle.work, obstacle.friction_loss) = (contact.work, contact.friction_loss);
+        }
+        if let Some(between) = &mut self.loads.contacts.between {
+            between.slips.clone_from(&update.slips);
+            between.energy = update.energy;
+            let pairs = between.pairs.iter_mut().zip(&update.pairs);
+            pairs.for_each(|(pair, contact)| pair.friction_loss = contact.friction_loss);
+        }
+    }
+
+    /// The energy stored in the contact with obstacles and between bodies: Σ ½ k g² A.
+    pub fn contact_energy(&self) -> f64 {
+        let (particles, penalties) = (&self.particles, penalties(&self.bodies, self.grid.spacing));
+        let around = Surroundings {
+            t: self.load(),
+            spacing: self.grid.spacing,
+            stiffness: |p: usize| penalties[particles.body[p] as usize],
+            position: |carrier: &Carrier<D>| particles.position[carrier.particle],
+        };
+        let touching = obstacle_points(&self.loads.contacts, &around);
+        let between = self.loads.contacts.between.as_ref().map_or(0.0, |between| between.energy);
+        touching.iter().fold(between, |sum, one| sum + one.law.energy(&one.y) * one.area)
+    }
+}
+
+/// The motion of obstacles and surfaces in a step.
+struct Motion<const D: usize> {
+    /// The poses of all obstacles at both ends.
+    poses: [Vec<Pose<D>>; 2],
+    /// The positions of all points at the end.
+    positions: Vec<Vector<f64, D>>,
+    /// The positions of facing points relative to the other body, at both ends.
+    relative: HashMap<usize, [Vector<f64, D>; 2]>,
+}
+
+/// The box through which the surface of a body moves in a step.
+#[derive(Clone, Copy)]
+struct Swept<const D: usize> {
+    low: Vector<f64, D>,
+    high: Vector<f64, D>,
+    /// The motion of one point.
+    motion: Vector<f64, D>,
+    /// The largest difference of another point's motion.
+    spread: f64,
+}
+
+impl<const D: usize> ContactUpdate<D> {
+    /// Adds the force, the area, the depth and the new state of friction of a point at the end of the step.
+    fn add_end(&mut self, one: &ContactPoint<f64, D>, contacts: &Contacts<D>, motion: &Motion<D>) {
+        let ContactPoint { touching, number, area, pose, law, y, .. } = one;
+        let force = one.force();
+        let (contact, arm, on_other) = match *touching {
+            Touching::Obstacle(obstacle) => {
+                if let Some(anchor) = self.anchors[obstacle].get_mut(*number) {
+                    *anchor = law.new_anchor(y);
+                }
+                let arm = pose.rotation * (y - middle(&contacts.obstacles[obstacle]));
+                (&mut self.obstacles[obstacle], arm, -force)
+            }
+            Touching::Pair { pair, is_first } => {
+                if let Some(slip) = self.slips.get_mut(*number) {
+                    *slip = law.along(&(y - law.new_anchor(y)));
+                }
+                self.energy += law.energy(y) * area;
+                (&mut self.pairs[pair], motion.positions[*number], if is_first { -force } else { force })
+            }
+        };
+        contact.force += on_other;
+        contact.moment = add(contact.moment, moment(&arm, &on_other));
+        contact.area += area;
+        contact.depth = contact.depth.max(law.depth(y));
+    }
+
+    /// Adds half the work of a force at one end of the step: the trapezoidal rule. An obstacle moves between the poses at both ends of the
+    /// step, and the point between the `positions`. Friction loses the work along the motion of the point relative to the obstacle or to the
+    /// other body.
+    fn add_work(&mut self, one: &ContactPoint<f64, D>, motion: &Motion<D>, positions: &[Vector<f64, D>; 2]) {
+        let friction = one.law.traction(Response::Friction, &one.y) * one.area;
+        let (contact, relative, work) = match one.touching {
+            Touching::Obstacle(obstacle) => {
+                let [start, end] = [&motion.poses[0][obstacle], &motion.poses[1][obstacle]];
+                let moved = end.to_space(&one.y) - start.to_space(&one.y);
+                let relative = end.to_frame(&positions[1]) - start.to_frame(&positions[0]);
+                (&mut self.obstacles[obstacle], relative, 0.5 * one.force().dot(&moved))
+            }
+            Touching::Pair { pair, .. } => {
+                let [start, end] = motion.relative[&one.number];
+                (&mut self.pairs[pair], end - start, 0.0)
+            }
+        };
+        let loss = -0.5 * friction.dot(&relative);
+        mutant!("obstacles: friction loses nothing": loss = 0.0);
+        contact.work += work;
+        self.work += work;
+        contact.friction_loss += loss;
+        self.friction_loss += loss;
+    }
+}
+
+/// All points in contact at the time of `step`, with the nodal motion `phi` since the last grid reset.
+fn points_at<const D: usize, L: Law>(step: &Step<'_, D, L>, phi: &[Vector<f64, D>]) -> Vec<ContactPoint<f64, D>> {
+    ContactForce::pressure(step).map_or_else(Vec::new, |force| force.contact_points(phi))
+}
+
+/// The depth, in spacings, of a point that enters an obstacle too deeply or goes through it; `None` for an allowed motion. The point moves
+/// straight between two positions in the frame of the obstacle.
+fn entry<const D: usize>(shape: &Shape<D>, [start, end]: &[Vector<f64, D>; 2], h: f64) -> Option<f64> {
+    let length = (end - start).norm();
+    let before = shape.signed_distance(start);
+    // A positive distance is at most the distance of the surface. NaN stays outside.
+    if before >= length || before.is_nan() {
+        return None;
+    }
+    let (after, normal) = shape.distance_and_normal(end);
+    let depth = -after / h;
+    if before < 0.0 {
+        let turned = after < 0.0 && shape.normal(start).dot(&normal) < 0.0;
+        return turned.then_some(depth);
+    }
+    if depth > DEEPEST_ENTRY {
+        return Some(depth);
+    }
+    let samples = (length / (SAMPLED * h)).ceil().min(MOST_SAMPLES);
+    let at = |sample: f64| shape.signed_distance(&(start + (end - start) * (sample / samples)));
+    let deepest = (1..samples as u32).map(|sample| at(f64::from(sample))).fold(0.0, f64::min);
+    (after >= 0.0 && deepest < 0.0).then_some(-deepest / h)
+}
+
+/// The anchors of points that touch nothing: their positions.
+fn free_anchors<const D: usize>(
+    obstacle: &Obstacle<D>,
+    pose: &Pose<D>,
+    positions: &[Vector<f64, D>],
+) -> Vec<Vector<f64, D>> {
+    if obstacle.friction > 0.0 { positions.iter().map(|x| pose.to_frame(x)).collect() } else { Vec::new() }
+}
+
+/// The middle of the obstacle's bounding box at t = 0; the origin for an unbounded obstacle.
+fn middle<const D: usize>(obstacle: &Obstacle<D>) -> Vector<f64, D> {
+    let (min, max) = obstacle.shape.bounding_box();
+    let middle = (min + max) * 0.5;
+    if middle.iter().all(|x| x.is_finite()) { middle } else { Vector::zeros() }
+}
+
+/// r × f; in 2D and 1D only the last component.
+fn moment<const D: usize>(arm: &Vector<f64, D>, force: &Vector<f64, D>) -> [f64; 3] {
+    let [r, f] = [arm, force].map(|x| Vector3::from_fn(|i, _| if i < D { x[i] } else { 0.0 }));
+    r.cross(&f).into()
+}
+
+fn add(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|i| a[i] + b[i])
+}
