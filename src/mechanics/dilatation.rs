@@ -1,11 +1,13 @@
 //! The mean dilatation of the particles of a cell: Θ = Σ V_p ΔJ_p / Σ V_p. V_p is the volume at the last grid reset, ΔJ_p the volume ratio
-//! since then. A particle belongs to the cell that it was in at that reset. Each body in a cell has a mean of its own.
+//! since then. A particle belongs to the cell that it was in at that reset. Each body in a cell has a mean of its own. With
+//! aggregation, the particles of a hardly filled cell belong to a better filled cell ([`joined_cells`](super::joined_cells)).
 //!
-//! A particle stores θ. Its stress depends on θ = Θ θ_r, where θ_r is the value at the last grid reset, the product of the Θ of all earlier grids.
-//! So stresses are continuous at a grid reset. The reference configuration keeps θ_r.
+//! A particle stores θ. Its stress depends on θ = Θ θ_r, where θ_r is the value at the last grid reset, the product of the Θ of all earlier
+//! grids. So stresses are continuous at a grid reset. The reference configuration keeps θ_r.
 
 use crate::lanes::LANES;
 use crate::material::{Law, p_wave_modulus};
+use crate::mechanics::joined_cells::{Content, Key, joined_cells};
 use crate::mechanics::sweep::{Number, Supports};
 use crate::mechanics::trial::Trial;
 use crate::particles::{Body, Particles};
@@ -22,7 +24,8 @@ pub(crate) struct Member {
     pub slot: u32,
 }
 
-/// The units of a cell whose dilatation is an unknown of its own. κ is θ (θ U′)′ at θ = 1: Λ in Ciarlet's law, K in logarithmic strains. The unknown is a length and its residual a force, like those of nodes.
+/// The units of a cell whose dilatation is an unknown of its own. κ is θ (θ U′)′ at θ = 1: Λ in Ciarlet's law, K in logarithmic strains.
+/// The unknown is a length and its residual a force, like those of nodes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Scale {
     /// G/h, the residual per difference of volumes.
@@ -58,13 +61,54 @@ pub(crate) struct Cells {
     beside: Vec<(usize, usize)>,
     /// Σ V_p
     volumes: Vec<f64>,
+    /// The grid's id of every cell.
+    pub ids: Vec<u64>,
     /// The units of every cell.
     pub scales: Vec<Scale>,
 }
 
+/// The cell and the body of a particle, its id, and its place.
+type Keyed = (Key, u32, Member);
+
+/// The particles of averaged cells, sorted by cell and id. With aggregation, no particle is in a cell that its body hardly fills,
+/// if there is a better filled cell next to it. Without aggregation, hardly filled cells have a motion of their own, and thus a pressure.
+fn keyed<const D: usize>(particles: &Particles<D>, averages: &[bool], supports: &Supports<D>) -> Vec<Keyed> {
+    let (grid, reference) = (supports.grid(), particles.reference());
+    let mut keyed: Vec<Keyed> = Vec::new();
+    supports.each_group(|group| {
+        for (lane, &particle) in group.particles.iter().enumerate() {
+            let (p, slot) = (particle as usize, (group.number * LANES + lane) as u32);
+            let body = particles.body[p];
+            let averaged = averages[body as usize] && particles.is_solid(p);
+            if let Some(cell) = grid.cell(&reference.position[p]).filter(|_| averaged) {
+                keyed.push(((grid.id(cell), body), particles.id[p], Member { particle, slot }));
+            }
+        }
+    });
+    keyed.sort_unstable_by_key(|&(key, id, _)| (key, id));
+    mutant!("mean dilatation: hardly filled cells have a dilatation of their own": { return keyed; });
+    if supports.extension().is_none() {
+        return keyed;
+    }
+    let content = |&(key, _, member): &Keyed| {
+        let p = member.particle as usize;
+        Content { key, volume: reference.volume(p), position: reference.position[p] }
+    };
+    let contents: Vec<Content<D>> = keyed.iter().map(content).collect();
+    let joined = joined_cells(grid, &contents);
+    for (key, ..) in &mut keyed {
+        if let Ok(at) = joined.binary_search_by_key(key, |&(from, _)| from) {
+            *key = joined[at].1;
+        }
+    }
+    keyed.sort_unstable_by_key(|&(key, id, _)| (key, id));
+    keyed
+}
+
 impl Cells {
     /// Upper bound of the bytes per particle.
-    pub const BYTES: usize = size_of::<Member>() + 2 * size_of::<u32>() + size_of::<f64>();
+    pub const BYTES: usize =
+        size_of::<Member>() + 2 * size_of::<u32>() + size_of::<f64>() + size_of::<u64>() + size_of::<Scale>();
 
     /// The cells of the bodies with mean dilatation; `None` if there is no such body.
     pub fn of<const D: usize, L: Law>(
@@ -77,24 +121,14 @@ impl Cells {
             return None;
         }
         let (grid, reference) = (supports.grid(), particles.reference());
-        let mut keyed = Vec::new();
-        supports.each_group(|group| {
-            for (lane, &particle) in group.particles.iter().enumerate() {
-                let (p, slot) = (particle as usize, (group.number * LANES + lane) as u32);
-                let body = particles.body[p];
-                let averaged = averages[body as usize] && particles.is_solid(p);
-                if let Some(cell) = grid.cell(&reference.position[p]).filter(|_| averaged) {
-                    keyed.push(((grid.id(cell), body), particles.id[p], Member { particle, slot }));
-                }
-            }
-        });
-        keyed.sort_unstable_by_key(|&(cell, id, _)| (cell, id));
+        let keyed = keyed(particles, &averages, supports);
         let mut cells = Self {
             members: keyed.iter().map(|&(.., member)| member).collect(),
             starts: vec![0],
             of: vec![NONE; particles.len()],
             beside: Vec::new(),
             volumes: Vec::new(),
+            ids: Vec::new(),
             scales: Vec::new(),
         };
         let scales: Vec<Scale> = bodies.iter().map(|body| Scale::of(body, grid.spacing)).collect();
@@ -106,6 +140,7 @@ impl Cells {
                 cells.of[*particle as usize] = cells.volumes.len() as u32;
                 volume += reference.volume(*particle as usize);
             }
+            cells.ids.push(same[0].0.0);
             cells.scales.push(scales[same[0].0.1 as usize]);
             cells.volumes.push(volume);
             cells.starts.push(cells.starts[cells.volumes.len() - 1] + same.len() as u32);
@@ -208,4 +243,35 @@ pub(crate) fn after<const D: usize, L: Law>(
     // Surface points take the mean of the nearest cell, so that their stresses are those of the body.
     cells.beside.iter().for_each(|&(p, cell)| all[p] = seen(p, cell));
     all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::aggregation::Extension;
+    use crate::approximation::Linear;
+    use crate::grid::Grid;
+    use crate::material::{Lame, NeoHookean};
+    use crate::particles::Dilatation;
+
+    /// Two particles fill a cell, and one fills a tenth of the next cell.
+    #[test]
+    fn hardly_filled_cells_are_joined_only_with_aggregation() -> Result<(), Box<dyn std::error::Error>> {
+        let grid = Grid { origin: Vector::from([0.0]), spacing: 1.0, cells: [4] };
+        let mut particles = Particles::<1>::default();
+        for (x, volume) in [(0.25, 0.5), (0.75, 0.5), (1.05, 0.1)] {
+            particles.push_without_inertia(Vector::from([x]), volume, volume, 0);
+        }
+        let law = NeoHookean::ciarlet(Lame::new(100.0, 1.0)?);
+        let bodies = [Body { name: "bar".into(), law, density: 1.0, dilatation: Dilatation::MeanDilatation }];
+        let cells = |supports: &Supports<1>| {
+            let cells = Cells::of(&particles, &bodies, supports);
+            let counts = |cells: Cells| cells.iter().map(|(members, _)| members.len()).collect::<Vec<_>>();
+            cells.map(counts)
+        };
+        let (supports, _) = Supports::new(&Linear, &grid, &particles.position)?;
+        assert_eq!(cells(&supports), Some(vec![2, 1]));
+        assert_eq!(cells(&supports.with_extension(Extension::default())), Some(vec![3]));
+        Ok(())
+    }
 }

@@ -6,6 +6,7 @@ pub mod constitutive;
 pub(crate) mod contact;
 pub(crate) mod dilatation;
 pub(crate) mod facing;
+mod joined_cells;
 pub mod loads;
 mod local_form;
 pub mod mass;

@@ -32,7 +32,7 @@ fn a_slope_fails_at_the_factor_of_griffiths_and_lane() -> Result<(), Failure> {
 /// The limit pressure of a tube is 2/√3 Y ln(b/a) = 0.1921 GPa (Hill). The error after the last halved step names the possible cause.
 #[test]
 fn a_pressure_that_a_tube_cannot_bear_is_found_and_said() -> Result<(), Failure> {
-    let mut simulation: Simulation<2> = scene("tube.json", &["time.end=1", "grid.spacing=24"])?;
+    let mut simulation: Simulation<2> = scene("tube.json", &["time.end=1", "grid.spacing=16"])?;
     let error = failure(&mut simulation);
     let borne = 0.2 * error.time / (2.0 / 3.0_f64.sqrt() * 0.24 * 2.0_f64.ln());
     assert!((0.99..1.005).contains(&borne), "{borne}");

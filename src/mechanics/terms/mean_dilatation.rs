@@ -239,7 +239,7 @@ impl<const D: usize, L: Law> LinearizedMean<'_, D, L> {
     fn mixed_cells(&self, states: &[State<f64>]) -> Vec<MixedCell<D>> {
         let Step { particles, supports, .. } = self.of.step;
         let (grid, reference) = (supports.grid(), particles.reference());
-        let cell = |(members, reference_volume): (&[Member], f64), state: &State<f64>, scale: &Scale| {
+        let cell = |(members, reference_volume): (&[Member], f64), state: &State<f64>, scale: &Scale, id: u64| {
             let volume = (1.0 + state.change) * reference_volume;
             let (mut pull, mut centroid) = (Tensor::zeros(), Vector::zeros());
             for member in members {
@@ -250,7 +250,7 @@ impl<const D: usize, L: Law> LinearizedMean<'_, D, L> {
             let bulk = (state.stiffness * volume).max(SOFTEST * scale.shear);
             MixedCell {
                 field: supports.field_of(particles.body[members[0].particle as usize]),
-                index: grid.cell(&reference.position[members[0].particle as usize]).unwrap_or([0; D]),
+                index: grid.index(id),
                 centroid,
                 volume,
                 pull,
@@ -260,8 +260,9 @@ impl<const D: usize, L: Law> LinearizedMean<'_, D, L> {
                 reference_volume,
             }
         };
-        let all = self.of.cells.iter().zip(states).zip(&self.of.cells.scales);
-        all.map(|((members, state), scale)| cell(members, state, scale)).collect()
+        let cells = &self.of.cells;
+        let all = cells.iter().zip(states).zip(cells.scales.iter().zip(&cells.ids));
+        all.map(|((members, state), (scale, &id))| cell(members, state, scale, id)).collect()
     }
 
     /// δp of every cell: as given, or k δv with δv = Σ V₀ J A : ∇u (γ δv in the mixed form).

@@ -93,6 +93,7 @@ pub(super) const FAULTS: &[ShippedFault] = &[
     fault("mean dilatation: the product lacks the coupling within a cell", TANGENT, POINTS),
     fault("mean dilatation: that of earlier grids is forgotten", CELLS, POINTS),
     fault("mean dilatation: means of a kept grid stay where particles were", CELLS, KEPT),
+    fault("mean dilatation: hardly filled cells have a dilatation of their own", INCOMPRESSIBLE, LAWS),
     fault("mixed: the product lacks the compressibility", INCOMPRESSIBLE, POINTS),
     fault("mixed: the residual of a cell is that of half its volume", INCOMPRESSIBLE, POINTS),
     fault("contact: the tangent lacks the curvature of the obstacle", TOUCHES, OBSTACLES),
