@@ -151,20 +151,22 @@ fn pair_point<T: Real, const D: usize>(
     let y: Vector<T, D> =
         carriers.iter().fold(Vector::zeros(), |y, carrier| y + position(carrier) * T::lit(carrier.share));
     // NaN touches nothing.
-    if !(one.normal.dot(&y.map(T::value)) < 0.0) {
+    let gap = one.normal.dot(&y.map(T::value));
+    if gap >= 0.0 || gap.is_nan() {
         return None;
     }
     let softer = carriers.iter().map(|carrier| stiffness(carrier.particle)).fold(f64::INFINITY, f64::min);
     let slip = between.slips.get(one.number).copied().unwrap_or_else(Vector::zeros);
+    // The slip is y − a along the surface.
+    let anchor = one.start - slip;
+    mutant!("contact: bodies forget their slip": anchor = one.start);
     let law = ContactLaw {
         feature: Feature::Plane { point: Vector::zeros(), normal: one.normal },
         stiffness: between.stiffness * softer,
         friction: between.friction,
         elastic_slip: ELASTIC_SLIP * spacing,
-        // The slip is y − a along the surface.
-        anchor: one.start - slip,
+        anchor,
     };
-    mutant!("contact: bodies forget their slip": law.anchor = one.start);
     Some(ContactPoint {
         touching: Touching::Pair { pair: one.pair, is_first: one.is_first },
         number: one.number,

@@ -263,7 +263,7 @@ mod tests {
             particles.push_without_inertia(Vector::from([x]), volume, volume, 0);
         }
         let law = NeoHookean::ciarlet(Lame::new(100.0, 1.0)?);
-        let bodies = [Body { name: "bar".into(), law, density: 1.0, dilatation: Dilatation::MeanDilatation }];
+        let bodies = [Body { name: "bar".into(), law, density: 1.0, dilatation: Dilatation::MeanDilatation, field: 0 }];
         let cells = |supports: &Supports<1>| {
             let cells = Cells::of(&particles, &bodies, supports);
             let counts = |cells: Cells| cells.iter().map(|(members, _)| members.len()).collect::<Vec<_>>();

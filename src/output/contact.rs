@@ -74,8 +74,8 @@ impl Contact {
         let tension = now.tension.map_or_else(String::new, |tension| format!(" and a tension of {tension:.3e}"));
         format!(
             "bodies {a:?} and {b:?} share nodes since {since} and are pulled apart, at a gap of {}{tension}: while they share nodes they \
-             move as one there, and will not separate; if they are not meant to be bonded, start them farther apart than `bfree check` \
-             says that bodies feel each other, or lower grid.spacing",
+             move as one there, and will not separate; if they are not meant to be bonded, let them touch and part with the key \
+             contact of the scene",
             spacings(now.gap)
         )
     }

@@ -101,6 +101,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Inventory<'_, D, L, A> {
         let loaded: usize = loads.surface.iter().map(|load| load.points.len()).sum();
         let points = loaded + loads.contacts.points.len();
         let anchors: usize = loads.contacts.obstacles.iter().map(|obstacle| obstacle.anchors.len()).sum();
+        let slips: usize = loads.contacts.between.iter().map(|between| between.slips.len()).sum();
         // In load steps, the points of the last equilibrium are stored, too.
         let copies = if self.has_inertia { 1 } else { 2 };
         vec![
@@ -117,10 +118,10 @@ impl<const D: usize, L: Law, A: ShapeFunction> Inventory<'_, D, L, A> {
             (carries_over, "nodal fields: out-of-balance force", out_of_balance),
             (
                 points > 0,
-                "loaded surfaces, and surfaces that may touch obstacles",
+                "loaded surfaces, and surfaces that may touch something",
                 points * copies * size_of::<SurfacePoint<D>>(),
             ),
-            (anchors > 0, "anchors of friction", anchors * 2 * copies * Self::VECTOR),
+            (anchors + slips > 0, "state of friction", (anchors + slips) * 2 * copies * Self::VECTOR),
         ]
     }
 

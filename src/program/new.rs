@@ -20,9 +20,9 @@ macro_rules! problems {
 }
 
 /// Name and scene of every problem.
-const PROBLEMS: [(&str, &str); 19] = problems! {
+const PROBLEMS: [(&str, &str); 21] = problems! {
     rebound collision cantilever compaction riemann_jump ball_drop column_static elastica cook ring tube cook_plastic taylor slope
-    collapse bounce rolling punch wedge
+    collapse bounce rolling punch wedge rings billiard
 };
 
 /// File name of the schema beside the scene.

@@ -186,8 +186,8 @@ fn shipped_scenes_are_sound_and_have_nothing_to_warn_of() -> Result<(), Failure>
     }
     assert_eq!(
         names.join(" "),
-        "ball_drop block_static bounce cantilever collapse collision column_static compaction compaction_confined cook cook_plastic \
-         elastica foam punch rebound rebound_fast riemann riemann_jump ring rolling slope taylor tube wedge"
+        "ball_drop billiard block_static bounce cantilever collapse collision column_static compaction compaction_confined cook cook_plastic \
+         elastica foam punch rebound rebound_fast riemann riemann_jump ring rings rolling slope taylor tube wedge"
     );
     Ok(())
 }

@@ -17,7 +17,7 @@ pub struct Obstacle<const D: usize> {
     pub stiffness: f64,
     /// The coefficient of friction μ, ≥ 0.
     pub friction: f64,
-    /// The anchors of friction at t_n, one for each of [`Contacts::points`], in the frame of the obstacle. The elastic slip of a point is
+    /// The anchors of friction at t_n, one for each of [`Contacts::points`](super::Contacts::points), in the frame of the obstacle. The elastic slip of a point is
     /// its distance from its anchor along the surface. Empty without friction.
     pub anchors: Vec<Vector<f64, D>>,
     /// The work of the moving obstacle on the bodies since the start.

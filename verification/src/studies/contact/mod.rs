@@ -21,7 +21,7 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     reports.push(between::impact(effort)?);
     reports.push(incline::report(effort)?);
     reports.push(between::slope(effort)?);
-    reports.push(between::mirrored()?);
+    reports.push(between::mirrored(effort)?);
     reports.push(wedge::report(effort)?);
     reports.push(indentation::patch()?);
     if *effort == Effort::Full {
