@@ -47,7 +47,7 @@ pub(crate) struct ContactLaw<const D: usize> {
     anchor: Vector<f64, D>,
 }
 
-/// What a point touches.
+/// The partner of a point in contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Touching {
     /// An obstacle, by its number.
@@ -86,8 +86,8 @@ pub(crate) struct ContactPoint<T, const D: usize> {
     pub y: Vector<T, D>,
 }
 
-/// What the search for contact needs beside the contacts: the penalty stiffness of a particle's body (pressure per depth), and the position
-/// of a carrier.
+/// The surroundings of the contacts: the time, the grid spacing, the penalty stiffness of a particle's body (pressure per depth), and the
+/// position of a carrier.
 pub(crate) struct Surroundings<S, P> {
     pub t: f64,
     pub spacing: f64,

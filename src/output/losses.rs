@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 /// The event of a step that may lose energy. Of several events, the first in this list counts.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Cause {
-    /// A body touches an obstacle.
+    /// A body touches an obstacle or another body.
     Obstacle,
     /// A body feels a wall that it has come to.
     Wall,
@@ -35,7 +35,7 @@ impl Cause {
     /// Steps of this kind, in words.
     fn steps(self) -> &'static str {
         match self {
-            Self::Obstacle => "steps in which a body touches an obstacle",
+            Self::Obstacle => "steps in which a body touches an obstacle or another body",
             Self::Wall => "steps in which a body meets a wall (impact)",
             Self::Bodies => "steps in which bodies share nodes (impact, or sticking)",
             Self::NewGrid => "other steps with a new grid",

@@ -1,5 +1,6 @@
-//! Contact between bodies.
+//! Contact between bodies, and checks of all contacts.
 
+use super::Scene;
 use super::obstacle::{check_law, default_stiffness, too_stiff};
 use crate::problems::Problems;
 use schemars::JsonSchema;
@@ -60,5 +61,41 @@ impl Contact {
             fields.push(earlier.map_or(new, |j| fields[j]));
         }
         fields
+    }
+}
+
+impl Scene {
+    /// Whether surfaces may touch an obstacle or another body.
+    pub(super) fn has_contact(&self) -> bool {
+        !self.obstacles.is_empty() || self.contact.is_some()
+    }
+
+    /// The nodal field of each body.
+    pub(super) fn nodal_fields(&self) -> Vec<u32> {
+        let names = self.body_names();
+        self.contact.as_ref().map_or_else(|| vec![0; names.len()], |contact| contact.fields(&names))
+    }
+
+    fn body_names(&self) -> Vec<&str> {
+        self.bodies.iter().map(|body| body.name.as_str()).collect()
+    }
+
+    /// Checks obstacles, and contact between bodies.
+    pub(super) fn check_contacts(&self, problems: &mut Problems, dimension: usize) {
+        for (i, obstacle) in problems.few("obstacles", &self.obstacles).iter().enumerate() {
+            let path = format!("obstacles[{i}]");
+            obstacle.check(problems, &path, dimension);
+            let again = self.obstacles.iter().take(i).any(|earlier| earlier.name == obstacle.name);
+            let allowed = "must differ from the names of the obstacles before";
+            problems.require(!again, &format!("{path}.name"), format_args!("{:?}", obstacle.name), allowed);
+        }
+        let from_files = self.bodies.iter().enumerate().filter(|(_, body)| body.particles.is_some());
+        for (i, _) in from_files.filter(|_| self.has_contact()) {
+            let allowed = "must be a shape where bodies touch obstacles or each other: they do so at points of the surface of their shape";
+            problems.refuse(&format!("bodies[{i}].particles"), "a file of particles", allowed);
+        }
+        if let Some(contact) = &self.contact {
+            contact.check(problems, &self.body_names(), dimension);
+        }
     }
 }

@@ -10,6 +10,7 @@ use crate::mechanics::loads::{
     BodyContact, Contacts, Curve, CurveError, ForceField, Gravity, Loads, Motion, Obstacle, Prescribed, Pressing,
     Rotation, Selection, SurfaceLoad, SurfacePoint,
 };
+use crate::mechanics::sweep::stride;
 use crate::shape;
 use crate::tensor::Vector;
 use std::sync::Arc;
@@ -76,7 +77,8 @@ impl<const D: usize> Builder<'_, D> {
         Ok(loads)
     }
 
-    /// What bodies may touch, and points on the whole surface of every body that may touch something.
+    /// The contacts, and points on the whole surface of every body, if there are contacts. Where bodies of one nodal field are joined, there is no
+    /// surface.
     fn contacts(&mut self) -> Result<Contacts<D>, BuildError> {
         let scene = self.scene;
         let mut contacts = Contacts::default();
@@ -86,7 +88,16 @@ impl<const D: usize> Builder<'_, D> {
             contacts.obstacles.push(Obstacle::new(one.name.clone(), shape, motion, one.stiffness, one.friction));
         }
         if let Some(contact) = &scene.contact {
-            contacts.between = Some(BodyContact::new(contact.stiffness, contact.friction, &scene.nodal_fields()));
+            let fields = scene.nodal_fields();
+            let count = fields.iter().max().map_or(1, |last| u64::from(last + 1));
+            if count * stride(self.grid.cells[D - 1]) > u64::from(u32::MAX) {
+                let what = format!(
+                    "{count} groups of bodies are too many for {} cells along the last axis",
+                    self.grid.cells[D - 1]
+                );
+                return Err(BuildError::at("contact", what));
+            }
+            contacts.between = Some(BodyContact::new(contact.stiffness, contact.friction, &fields));
         }
         let exist = contacts.exist();
         for (i, body) in scene.bodies.iter().enumerate().filter(|_| exist) {
@@ -94,6 +105,15 @@ impl<const D: usize> Builder<'_, D> {
                 Loaded { body: &body.name, region: &None, stress: Stress::Pressure(0.0), curve: &None, surface: &None };
             contacts.points.extend(self.points(&format!("bodies[{i}]"), &whole)?);
         }
+        let (fields, shapes) = (scene.nodal_fields(), self.shapes());
+        let is_joint = |point: &SurfacePoint<D>| {
+            let (own, x) = (self.particles.body[point.particle] as usize, &self.particles.position[point.particle]);
+            let others = (0..shapes.len()).filter(|&other| other != own && fields[other] == fields[own]);
+            let within = 2.0 * shape::SURFACE_DEPTH * self.grid.spacing;
+            others.filter_map(|other| shapes[other].as_ref()).any(|shape| shape.signed_distance(x) <= within)
+        };
+        mutant!("contact: joints of a group are surfaces": { return Ok(contacts); });
+        contacts.points.retain(|point| !is_joint(point));
         Ok(contacts)
     }
 
@@ -133,10 +153,15 @@ impl<const D: usize> Builder<'_, D> {
         Ok(())
     }
 
+    /// The shape of each body; `None` for a body from a file.
+    fn shapes(&self) -> Vec<Option<shape::Shape<D>>> {
+        self.scene.bodies.iter().map(|body| body.shape.as_ref()?.build::<D>()).collect()
+    }
+
     /// Refuses bodies that start in each other, where they may touch.
     pub fn refuse_overlapping_bodies(&self, contacts: &Contacts<D>) -> Result<(), BuildError> {
         let (particles, h) = (&self.particles, self.grid.spacing);
-        let shapes: Vec<_> = self.scene.bodies.iter().map(|body| body.shape.as_ref()?.build::<D>()).collect();
+        let shapes = self.shapes();
         for pair in contacts.between.iter().flat_map(|between| &between.pairs) {
             let [one, other] = pair.bodies;
             for (inner, outer) in [(one, other), (other, one)] {

@@ -24,6 +24,7 @@ pub mod transfer;
 
 mod build;
 mod build_error;
+mod defaults;
 mod file;
 mod filling;
 mod json;
@@ -42,34 +43,21 @@ pub use overrides::{Override, OverrideError};
 pub use read::{MAX_BYTES, SceneError, read, read_file};
 
 use crate::approximation;
-use crate::field::Field;
-use crate::material::{Law, Material, PLASTIC_STRAIN};
+use crate::material::{Law, Material};
 use crate::mechanics::loads::Rayleigh;
 use crate::mechanics::reference::GridReset;
-use crate::mechanics::schemes::{LONG_STEPS, Parameters};
+use crate::mechanics::schemes::Parameters;
 use crate::shape::Layout;
 use crate::simulation::InitialGuess;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-/// The strain up to which load steps keep a grid by themselves.
-const STATIC_STRAIN: f64 = 1.0;
-
-/// The strain up to which a clamped body keeps its grid with inertia. The cantilever of `docs/src/choosing.md` loses 0.01 % of its energy.
-const VIBRATION_STRAIN: f64 = 0.1;
-
 /// Keys that have a meaning only with inertia.
 const OF_INERTIA: [&str; 3] = ["transfer", "initial_velocity", "damping"];
 
 /// Keys of `time` that have a meaning only with inertia.
 const TIME_OF_INERTIA: [&str; 6] = ["beta", "gamma", "lumping", "projection", "wall_update", "adaptive"];
-
-/// The default of `time.lumping` where bodies may touch obstacles or each other (`docs/src/obstacles.md`).
-const LUMPING_IN_CONTACT: f64 = 0.1;
-
-/// A body that comes this near to a face of the box, in spacings, touches it.
-const TOUCHES: f64 = 1e-9;
 
 /// A simulation: bodies in a box, what acts on them, and how it is computed. All units are the user's own consistent set.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
@@ -108,8 +96,8 @@ pub struct Scene {
     pub prescribed: Vec<boundary::Prescribed>,
     /// Whether nodes with little support from a body follow well-supported nodes (extended B-splines). Such nodes are not unknowns: they
     /// continue the polynomial of the nearest well-filled cell. Surface loads then act through functions that balance the internal force.
-    /// Default: true without inertia, with a consistent mass (`time.lumping` 0), where the surface of a shape is loaded, and in steps of
-    /// constant length at Courant numbers above 10; else false.
+    /// Default: true without inertia, with a consistent mass (`time.lumping` 0), where the surface of a shape is loaded, with `obstacles` or
+    /// `contact`, and in steps of constant length at Courant numbers above 10; else false.
     pub aggregation: Option<bool>,
     /// Deprecated, and read for one release: aggregation has replaced the ghost stiffness. If `aggregation` is not given, 0 means false,
     /// and a positive value means true.
@@ -240,80 +228,6 @@ impl Scene {
         problems
     }
 
-    /// Whether nodes with little support from a body follow other nodes. In short steps a lumped mass holds such nodes, except where a node
-    /// has more of a loaded surface than of the particles below. Adaptive steps become short at impacts.
-    fn aggregates(&self) -> bool {
-        let computed = self.surface_loads().any(|(_, load)| load.surface.is_none());
-        let has_inertia = self.time.scheme().has_inertia();
-        let courant = || accuracy::courant(&self.bodies, self.grid.spacing, self.time.step).unwrap_or(0.0);
-        let long_steps = self.time.adaptive.is_none() && (!has_inertia || courant() > LONG_STEPS);
-        let consistent = has_inertia && self.lumping() == 0.0;
-        let needed = long_steps || consistent || computed || self.has_contact();
-        self.aggregation.or(self.ghost_stiffness.map(|factor| factor > 0.0)).unwrap_or(needed)
-    }
-
-    /// Whether surfaces may touch an obstacle or another body.
-    fn has_contact(&self) -> bool {
-        !self.obstacles.is_empty() || self.contact.is_some()
-    }
-
-    /// The nodal field of each body.
-    pub(super) fn nodal_fields(&self) -> Vec<u32> {
-        let names: Vec<&str> = self.bodies.iter().map(|body| body.name.as_str()).collect();
-        self.contact.as_ref().map_or_else(|| vec![0; names.len()], |contact| contact.fields(&names))
-    }
-
-    /// ε, the lumped share of the mass. Bodies that touch obstacles or each other lose energy with a lumped mass, and a consistent one
-    /// makes the force of contact ring.
-    pub(super) fn lumping(&self) -> f64 {
-        let default = if self.has_contact() { LUMPING_IN_CONTACT } else { 1.0 };
-        self.time.lumping.unwrap_or(default)
-    }
-
-    /// When the grid is reset. A clamped body vibrates, and seldom meets anything. Obstacles need no reset either. Other bodies may come to
-    /// walls, and a grid that is reset in every step feels a wall from farther away.
-    fn grid_reset(&self) -> GridReset {
-        let flip = self.transfer.is_none_or(|transfer| transfer == transfer::Transfer::Flip);
-        self.grid.given_reset().unwrap_or(match self.time.scheme().has_inertia() {
-            false => GridReset::Strain(STATIC_STRAIN),
-            true if flip && (self.is_clamped() || self.has_contact()) => GridReset::Strain(VIBRATION_STRAIN),
-            true => GridReset::EveryStep,
-        })
-    }
-
-    /// Whether the scene has one body, and its shape reaches a fixed face of the box.
-    fn is_clamped(&self) -> bool {
-        let [body] = self.bodies.as_slice() else { return false };
-        let bounds = body.shape.as_ref().and_then(|shape| shape.check(&mut Problems::default(), "", self.dimension()));
-        let Some([lower, upper]) = bounds else { return false };
-        let (origin, near) = (self.grid.origin(), TOUCHES * self.grid.spacing);
-        (0..self.dimension()).any(|k| {
-            let is_fixed = |upper| *self.boundary.face(k, upper) == boundary::Face::Fixed;
-            let far_end = origin[k] + self.grid.size[k];
-            (is_fixed(false) && lower[k] < origin[k] + near) || (is_fixed(true) && upper[k] > far_end - near)
-        })
-    }
-
-    /// The fields of a snapshot.
-    ///
-    /// ```
-    /// use bfree::field::Field;
-    ///
-    /// // Without inertia there are no velocities to show; where a metal flows, its plastic strain is what pictures show.
-    /// let of = |name: &str| {
-    ///     let asked = ["output.fields=null".parse()?];
-    ///     Ok::<_, Box<dyn std::error::Error>>(bfree::scene::read_file(format!("scenes/{name}.json").as_ref(), &asked)?.fields())
-    /// };
-    /// assert_eq!(of("cook")?, [Field::Displacement, Field::Stress, Field::Jacobian]);
-    /// assert_eq!(of("tube")?, [Field::PlasticStrain, Field::Displacement, Field::Stress, Field::Jacobian]);
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    pub fn fields(&self) -> Vec<Field> {
-        let has_plastic_flow =
-            self.laws().any(|law| law.internal_variables().iter().any(|one| one.name == PLASTIC_STRAIN));
-        self.output.fields(self.time.scheme().has_inertia(), has_plastic_flow)
-    }
-
     /// The laws of all bodies whose constants are allowed.
     fn laws(&self) -> impl Iterator<Item = Material> {
         self.bodies.iter().filter_map(|body| body.material.law(&mut Problems::default(), ""))
@@ -372,23 +286,6 @@ impl Scene {
         problems.require(kept, "grid.reset", "\"every_step\"", allowed);
     }
 
-    /// Fills in defaults that depend on other keys, for all keys that have a meaning in this scene.
-    fn complete(mut self) -> Self {
-        if self.time.scheme().has_inertia() {
-            self.time.lumping = Some(self.lumping());
-        }
-        self.time.complete();
-        let layouts: Vec<_> = self.bodies.iter().map(|body| self.filling(body).layout).collect();
-        self.bodies.iter_mut().zip(layouts).for_each(|(body, layout)| body.layout = Some(layout));
-        self.grid.reset = Some(self.grid_reset());
-        if self.time.scheme().has_inertia() {
-            self.transfer.get_or_insert_default();
-        }
-        self.aggregation = Some(self.aggregates());
-        self.output.fields = Some(self.fields());
-        self
-    }
-
     fn check_loads(&self, problems: &mut Problems, dimension: usize) {
         if let Some(gravity) = &self.gravity {
             gravity.check(problems, dimension);
@@ -401,26 +298,7 @@ impl Scene {
         for (path, load) in self.surface_loads() {
             load.check(problems, &path, &self.bodies, dimension);
         }
-        self.check_obstacles(problems, dimension);
-        if let Some(contact) = &self.contact {
-            let names: Vec<&str> = self.bodies.iter().map(|body| body.name.as_str()).collect();
-            contact.check(problems, &names, dimension);
-        }
-    }
-
-    fn check_obstacles(&self, problems: &mut Problems, dimension: usize) {
-        for (i, obstacle) in problems.few("obstacles", &self.obstacles).iter().enumerate() {
-            let path = format!("obstacles[{i}]");
-            obstacle.check(problems, &path, dimension);
-            let again = self.obstacles.iter().take(i).any(|earlier| earlier.name == obstacle.name);
-            let allowed = "must differ from the names of the obstacles before";
-            problems.require(!again, &format!("{path}.name"), format_args!("{:?}", obstacle.name), allowed);
-        }
-        let from_files = self.bodies.iter().enumerate().filter(|(_, body)| body.particles.is_some());
-        for (i, _) in from_files.filter(|_| self.has_contact()) {
-            let allowed = "must be a shape where bodies touch obstacles or each other: they do so at points of the surface of their shape";
-            problems.refuse(&format!("bodies[{i}].particles"), "a file of particles", allowed);
-        }
+        self.check_contacts(problems, dimension);
     }
 
     fn check_initial_velocity(&self, initial: &InitialVelocity, problems: &mut Problems, dimension: usize) {

@@ -33,8 +33,8 @@ pub struct Time {
     /// Newmark's γ (no unit), 0.5 ≤ γ ≤ 2β; values above 0.5 damp; for `"newmark"` only. Default 0.5.
     #[schemars(range(min = 0.5))]
     pub gamma: Option<f64>,
-    /// ε of the mass matrix (1 − ε) M + ε lumped(M), 0 (consistent) to 1 (lumped). Default: 1; 0.1 where there
-    /// are obstacles.
+    /// ε of the mass matrix (1 − ε) M + ε lumped(M), 0 (consistent) to 1 (lumped). Default: 1; 0.1 with `obstacles`
+    /// or `contact`.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub lumping: Option<f64>,
     /// The starting point of Newton's method in a step. Default: `"last_step"` in load steps, `"zero"` with inertia.

@@ -4,7 +4,7 @@ use super::{Simulation, StepError};
 use crate::approximation::ShapeFunction;
 use crate::material::Law;
 use crate::mechanics::contact::{Carrier, ContactPoint, Response, Surroundings, Touching, obstacle_points};
-use crate::mechanics::facing::{DEEPEST, REACH, facing};
+use crate::mechanics::facing::{DEEPEST, Overlap, REACH, facing, overlaps};
 use crate::mechanics::loads::{Contacts, Facing, Obstacle, Pose};
 use crate::mechanics::terms::{ContactForce, Step, penalties};
 use crate::shape::Shape;
@@ -69,11 +69,9 @@ impl<const D: usize> ContactForces<D> {
 impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// Finds the points that may touch another body in the coming step.
     pub(super) fn find_facing(&mut self) {
-        let contacts = &self.loads.contacts;
-        if let Some(between) = &contacts.between {
-            let found = facing(contacts, between, &self.particles, &self.grid, self.clock.step());
-            self.loads.contacts.between.as_mut().into_iter().for_each(|between| between.facing.clone_from(&found));
-        }
+        let Some(mut between) = self.loads.contacts.between.take() else { return };
+        between.facing = facing(&self.loads.contacts, &between, &self.particles, &self.grid, self.clock.step());
+        self.loads.contacts.between = Some(between);
     }
 
     /// The contact at the end of a step, with the nodal motion `phi` since the last grid reset.
@@ -151,22 +149,32 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             let names = [own, other].map(|body| self.bodies[body as usize].name.clone());
             StepError::EntersBody { bodies: names, position: start(number).iter().copied().collect(), depth }
         };
-        for one in &between.facing {
-            let depth = -one.normal.dot(&motion.relative[&one.number][1]) / h;
-            if depth > DEEPEST || depth - (-one.normal.dot(&one.start) / h).max(0.0) > DEEPEST_ENTRY {
-                return Err(refused(one.number, one.pair, depth));
+        let depth = |one: &Facing<D>, relative: &Vector<f64, D>| -one.normal.dot(relative) / h;
+        let before: HashMap<usize, f64> =
+            between.facing.iter().map(|one| (one.number, depth(one, &one.start).max(0.0))).collect();
+        let known = between.facing.iter().map(|one| {
+            let depth = depth(one, &motion.relative[&one.number][1]);
+            (one.number, one.pair, depth)
+        });
+        // A point may have come around an edge, or along a curved surface.
+        let ends = overlaps(contacts, between, &self.particles, &self.grid, &motion.positions);
+        mutant!("contact: a point that did not face a body may enter it": ends = Vec::new());
+        let new = ends.iter().map(|&Overlap { number, pair, depth }| (number, pair, depth / h));
+        for (number, pair, depth) in known.chain(new) {
+            let entered = depth - before.get(&number).copied().unwrap_or(0.0);
+            if depth > DEEPEST || entered > DEEPEST_ENTRY {
+                return Err(refused(number, pair, depth));
             }
         }
         // The search has seen what is within its reach, so nothing may come from farther away.
         let boxes = self.boxes(&motion.positions);
-        for (number, pair) in between.pairs.iter().enumerate() {
+        for pair in &between.pairs {
             let [Some(one), Some(other)] = pair.bodies.map(|body| boxes[body as usize]) else { continue };
             let meet = (0..D).all(|k| one.low[k] <= other.high[k] && other.low[k] <= one.high[k]);
             let apart = one.motion - other.motion;
             if meet && apart.norm() + one.spread + other.spread > f64::from(REACH) * h {
-                let own = |at: &usize| body_of(*at) == pair.bodies[0];
-                let first = (0..contacts.points.len()).find(own).unwrap_or(0);
-                return Err(refused(first, number, f64::from(REACH)));
+                let bodies = pair.bodies.map(|body| self.bodies[body as usize].name.clone());
+                return Err(StepError::PassesBody { bodies, reach: REACH });
             }
         }
         Ok(())

@@ -185,10 +185,22 @@ pub enum StepError {
         /// Depth at the end of the step, in grid spacings.
         depth: f64,
     },
-    /// A point of a body enters another body too deeply, or bodies approach too fast.
+    /// Two bodies move so fast that contact may be missed.
     #[error(
-        "the point of body {:?} at {position:?} comes {depth:.2} grid spacings deep into body {:?} in one step, or approaches the body so \
-         fast that contact may be missed: take shorter steps, or a stiffer contact (contact.stiffness)",
+        "bodies {:?} and {:?} are near each other, and points of them move by more than {reach} grid spacings relative to each other in one \
+         step, so that contact may be missed: take shorter steps",
+        bodies[0], bodies[1]
+    )]
+    PassesBody {
+        /// Names of the bodies.
+        bodies: [String; 2],
+        /// The reach of the search for contact, in grid spacings.
+        reach: u32,
+    },
+    /// A point of a body enters another body too deeply.
+    #[error(
+        "the point of body {:?} at {position:?} comes {depth:.2} grid spacings deep into body {:?} in one step: take shorter steps, or a \
+         stiffer contact (contact.stiffness)",
         bodies[0], bodies[1]
     )]
     EntersBody {

@@ -1,9 +1,9 @@
-//! What bodies may touch: rigid obstacles, and each other.
+//! The contacts of the bodies: with rigid obstacles, and with each other.
 
 use super::{Obstacle, SurfacePoint};
 use crate::tensor::Vector;
 
-/// The surfaces of the bodies, and what they may touch.
+/// The surfaces of the bodies, and the contacts that they may have.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Contacts<const D: usize> {
     /// The points of the surfaces.

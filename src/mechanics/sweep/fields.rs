@@ -30,6 +30,12 @@ impl<'a> Fields<'a> {
     }
 }
 
+/// The distance between neighbouring fields in a [lattice](Supports::in_lattice), in cells. It is even on coarser grids of multigrid, down to
+/// one cell.
+pub(crate) fn stride(cells: u32) -> u64 {
+    8 * (u64::from(cells) + 1).next_power_of_two()
+}
+
 impl<const D: usize> Supports<D> {
     pub(super) fn with_fields(mut self, points: &Points<'_, D>) -> Self {
         self.fields.clone_from(&points.fields.of_body);
@@ -52,16 +58,10 @@ impl<const D: usize> Supports<D> {
         if self.fields.is_empty() { 0..self.nodes() } else { end(field)..end(field + 1) }
     }
 
-    /// The distance between neighbouring fields in a [lattice](Self::in_lattice), in cells. It is even on coarser grids of multigrid, down to
-    /// one cell.
-    fn stride(&self) -> u32 {
-        8 * (self.grid.cells[D - 1] + 1).next_power_of_two()
-    }
-
     /// The index of a node or a cell of a field in a lattice in which the fields lie side by side along the last axis. They lie so far
     /// apart that functions of coarser grids reach one field only.
     pub(crate) fn in_lattice(&self, field: u32, index: [u32; D]) -> [u32; 3] {
-        let shift = if field == 0 { 0 } else { field * self.stride() };
+        let shift = if field == 0 { 0 } else { field * stride(self.grid.cells[D - 1]) as u32 };
         std::array::from_fn(|k| index.get(k).map_or(0, |at| at + if k + 1 == D { shift } else { 0 }))
     }
 
@@ -69,7 +69,7 @@ impl<const D: usize> Supports<D> {
     pub(crate) fn lattice_cells(&self) -> [u32; 3] {
         let mut cells = std::array::from_fn(|k| self.grid.cells.get(k).copied().unwrap_or(0));
         if self.field_count() > 1 {
-            cells[D - 1] = self.field_count() * self.stride();
+            cells[D - 1] = self.field_count() * stride(self.grid.cells[D - 1]) as u32;
         }
         cells
     }

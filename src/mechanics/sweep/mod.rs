@@ -46,6 +46,7 @@ pub use block::Group;
 pub use blocks::Quadratic;
 pub(crate) use blocks::pair;
 pub use fields::Fields;
+pub(crate) use fields::stride;
 pub use kernel::At;
 pub use mode::{Mode, Weights};
 pub use number::Number;
