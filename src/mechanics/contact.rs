@@ -8,6 +8,12 @@
 //! - pressure: p n with p = −k g
 //! - friction: −μ p s/ε while |s| ≤ ε (stick), else −μ p s/|s| (slip), with the slip s = (1 − n ⊗ n)(y − a)
 //!
+//! In the energy–momentum scheme, p is the mean over the step from the gap g_n to g_{n+1}, with the potential ψ = ½ k ⟨−g⟩²:
+//!
+//! p = −(ψ(g_{n+1}) − ψ(g_n))/(g_{n+1} − g_n),  y = ½ (y_n + y_{n+1})
+//!
+//! Its work on a plane is the change of ψ, also in steps in which contact begins or ends.
+//!
 //! Under large pressures ε grows to μ p/k. Friction in stick is then −k s, and has a potential.
 //!
 //! The smallest elastic slip is a small part of the grid spacing. This slip does not depend on the pressure, so Newton's method also finds
@@ -16,7 +22,7 @@
 use crate::mechanics::loads::{BodyContact, Contacts, Facing, Partner, Pose, SurfacePoint};
 use crate::mechanics::sweep::Supports;
 use crate::scalar::Real;
-use crate::shape::{Distance, Feature};
+use crate::shape::Feature;
 use crate::tensor::{Tensor, Vector, identity, outer};
 
 /// The smallest elastic slip ε in grid spacings.
@@ -45,6 +51,8 @@ pub(crate) struct ContactLaw<const D: usize> {
     elastic_slip: f64,
     /// a
     anchor: Vector<f64, D>,
+    /// y_n, where the pressure is the mean over the step.
+    start: Option<Vector<f64, D>>,
 }
 
 /// The partner of a point in contact.
@@ -88,8 +96,10 @@ pub(crate) struct ContactPoint<T, const D: usize> {
 
 /// The surroundings of the contacts: the time, the grid spacing, the penalty stiffness of a particle's body (pressure per depth), and the
 /// position of a carrier.
-pub(crate) struct Surroundings<S, P> {
+pub(crate) struct Surroundings<'a, S, P, const D: usize> {
     pub t: f64,
+    /// t_n and the positions of the particles there, where pressures are means over the step.
+    pub start: Option<(f64, &'a [Vector<f64, D>])>,
     pub spacing: f64,
     pub stiffness: S,
     pub position: P,
@@ -98,12 +108,15 @@ pub(crate) struct Surroundings<S, P> {
 /// All points that touch an obstacle.
 pub(crate) fn obstacle_points<T: Real, const D: usize>(
     Contacts { points, obstacles, .. }: &Contacts<D>,
-    Surroundings { t, spacing, stiffness, position }: &Surroundings<
+    Surroundings { t, start, spacing, stiffness, position }: &Surroundings<
+        '_,
         impl Fn(usize) -> f64,
         impl Fn(&Carrier<D>) -> Vector<T, D>,
+        D,
     >,
 ) -> Vec<ContactPoint<T, D>> {
-    let poses: Vec<Pose<D>> = obstacles.iter().map(|obstacle| obstacle.pose(*t)).collect();
+    let poses_at = |t: f64| obstacles.iter().map(|obstacle| obstacle.pose(t)).collect::<Vec<Pose<D>>>();
+    let (poses, before) = (poses_at(*t), start.map(|(t, at)| (poses_at(t), at)));
     let mut found = Vec::new();
     for (number, &SurfacePoint { particle, area, .. }) in points.iter().enumerate().filter(|_| !obstacles.is_empty()) {
         let carrier = Carrier::at(particle);
@@ -111,14 +124,17 @@ pub(crate) fn obstacle_points<T: Real, const D: usize>(
         for (index, (obstacle, pose)) in obstacles.iter().zip(&poses).enumerate() {
             let y = pose.rotation.map(T::lit).tr_mul(&(x - pose.shift.map(T::lit)));
             let at = y.map(T::value);
+            let start = before.as_ref().map(|(poses, at)| poses[index].to_frame(&at[particle]));
+            let touches = |y: &Vector<f64, D>| obstacle.shape.signed_distance(y) < 0.0;
             // NaN touches nothing.
-            if obstacle.shape.signed_distance(&at) < 0.0 {
+            if touches(&at) || start.is_some_and(|start| touches(&start) || touches(&(at * 2.0 - start))) {
                 let law = ContactLaw {
                     feature: obstacle.shape.feature(&at),
                     stiffness: obstacle.stiffness * stiffness(particle),
                     friction: obstacle.friction,
                     elastic_slip: ELASTIC_SLIP * spacing,
                     anchor: obstacle.anchors.get(number).copied().unwrap_or(at),
+                    start,
                 };
                 let touching = Touching::Obstacle(index);
                 found.push(ContactPoint { touching, number, area, carriers: vec![carrier], pose: *pose, law, y });
@@ -131,7 +147,7 @@ pub(crate) fn obstacle_points<T: Real, const D: usize>(
 /// All points that touch another body.
 pub(crate) fn pair_points<T: Real, const D: usize>(
     contacts: &Contacts<D>,
-    around: &Surroundings<impl Fn(usize) -> f64, impl Fn(&Carrier<D>) -> Vector<T, D>>,
+    around: &Surroundings<'_, impl Fn(usize) -> f64, impl Fn(&Carrier<D>) -> Vector<T, D>, D>,
 ) -> Vec<ContactPoint<T, D>> {
     let facing = contacts.between.iter().flat_map(|between| between.facing.iter().map(move |one| (between, one)));
     facing.filter_map(|(between, one)| pair_point(contacts, between, one, around)).collect()
@@ -142,17 +158,21 @@ fn pair_point<T: Real, const D: usize>(
     contacts: &Contacts<D>,
     between: &BodyContact<D>,
     one: &Facing<D>,
-    Surroundings { spacing, stiffness, position, .. }: &Surroundings<
+    Surroundings { start, spacing, stiffness, position, .. }: &Surroundings<
+        '_,
         impl Fn(usize) -> f64,
         impl Fn(&Carrier<D>) -> Vector<T, D>,
+        D,
     >,
 ) -> Option<ContactPoint<T, D>> {
     let carriers = one.carriers(contacts);
     let y: Vector<T, D> =
         carriers.iter().fold(Vector::zeros(), |y, carrier| y + position(carrier) * T::lit(carrier.share));
+    let start = start.map(|_| one.start);
+    let at = y.map(T::value);
+    let touches = |y: &Vector<f64, D>| one.normal.dot(y) < 0.0;
     // NaN touches nothing.
-    let gap = one.normal.dot(&y.map(T::value));
-    if gap >= 0.0 || gap.is_nan() {
+    if !(touches(&at) || start.is_some_and(|start| touches(&start) || touches(&(at * 2.0 - start)))) {
         return None;
     }
     let softer = carriers.iter().map(|carrier| stiffness(carrier.particle)).fold(f64::INFINITY, f64::min);
@@ -166,6 +186,7 @@ fn pair_point<T: Real, const D: usize>(
         friction: between.friction,
         elastic_slip: ELASTIC_SLIP * spacing,
         anchor,
+        start,
     };
     Some(ContactPoint {
         touching: Touching::Pair { pair: one.pair, is_first: one.is_first },
@@ -234,8 +255,7 @@ pub(crate) enum Response {
 impl<const D: usize> ContactLaw<D> {
     /// The traction on the body, per reference area.
     pub fn traction<T: Real>(&self, response: Response, y: &Vector<T, D>) -> Vector<T, D> {
-        let Distance { distance, normal } = self.feature.at(y);
-        let pressure = -distance * T::lit(self.stiffness);
+        let (normal, pressure) = (self.feature.at(y).normal, self.pressure(y));
         if response == Response::Pressure {
             mutant!("contact: an obstacle pulls": { return normal * -pressure; });
             return normal * pressure;
@@ -248,6 +268,41 @@ impl<const D: usize> ContactLaw<D> {
             State::Stick => slip * (-pressure * T::lit(self.friction / self.elastic_slip)),
             State::Slip => slip * (-pressure * T::lit(self.friction) * length.sqrt().recip()),
         }
+    }
+
+    /// p
+    fn pressure<T: Real>(&self, y: &Vector<T, D>) -> T {
+        let Some((before, after)) = self.gaps(y) else { return self.feature.at(y).distance * T::lit(-self.stiffness) };
+        let half = T::lit(0.5 * self.stiffness);
+        match (before.value() < 0.0, after.value() < 0.0) {
+            (true, true) => -(before + after) * half,
+            (false, true) => after * after / (before - after) * half,
+            (true, false) => before * before / (after - before) * half,
+            (false, false) => T::zero(),
+        }
+    }
+
+    /// −∂p/∂y
+    fn stiffness_along(&self, y: &Vector<f64, D>) -> Vector<f64, D> {
+        let (Some((before, after)), Some(start)) = (self.gaps(y), self.start) else {
+            return self.feature.at(y).normal * self.stiffness;
+        };
+        // ∂g_{n+1}/∂y is twice the normal at y_{n+1}.
+        let change = (after - before).powi(2);
+        let share = match (before < 0.0, after < 0.0) {
+            (true, true) => 1.0,
+            (false, true) => after * (after - 2.0 * before) / change,
+            (true, false) => before * before / change,
+            (false, false) => 0.0,
+        };
+        mutant!("contact: the mean pressure has the tangent of full contact": share = 1.0);
+        self.feature.at(&(y * 2.0 - start)).normal * (share * self.stiffness)
+    }
+
+    /// g_n and g_{n+1}, where the pressure is the mean over the step.
+    fn gaps<T: Real>(&self, y: &Vector<T, D>) -> Option<(T, T)> {
+        let start = self.start?.map(T::lit);
+        Some((self.feature.at(&start).distance, self.feature.at(&(y * T::lit(2.0) - start)).distance))
     }
 
     /// The state of friction at a slip of this length.
@@ -264,30 +319,29 @@ impl<const D: usize> ContactLaw<D> {
 
     /// −∂t/∂y of the traction t.
     pub fn tangent(&self, response: Response, y: &Vector<f64, D>) -> Tensor<f64, D> {
-        let Distance { distance, normal: n } = self.feature.at(y);
-        let (k, mu) = (self.stiffness, self.friction);
+        let (n, pressure) = (self.feature.at(y).normal, self.pressure(y));
+        let (along, mu) = (self.stiffness_along(y), self.friction);
         let curvature = self.feature.curvature(y);
         if response == Response::Pressure {
             mutant!("contact: the tangent lacks the curvature of the obstacle": curvature = Tensor::zeros());
-            // k (n ⊗ n + g ∇²g)
-            return (outer(&n, &n) + curvature * distance) * k;
+            // −n ⊗ ∂p/∂y − p ∇²g, which is k (n ⊗ n + g ∇²g) at one instant
+            return outer(&n, &along) - curvature * pressure;
         }
         let r = y - self.anchor;
         let slip = self.slip(y, &n);
-        let pressure = -k * distance;
         // ∂s/∂y = 1 − n ⊗ n − (n·r) ∇²g − n ⊗ ∇²g r
         let of_slip = identity::<f64, D>() - outer(&n, &n) - curvature * n.dot(&r) - outer(&n, &(curvature * r));
         let length = slip.norm();
-        // −∂t/∂y = μ (q ⊗ ∂p/∂y + p ∂q/∂y), with t = −μ p q and ∂p/∂y = −k n
+        // −∂t/∂y = μ (q ⊗ ∂p/∂y + p ∂q/∂y), with t = −μ p q
         let (q, of_q) = match self.state(length, pressure) {
-            State::Spring => return of_slip * k,
+            State::Spring => return of_slip * self.stiffness,
             State::Stick => (slip / self.elastic_slip, of_slip / self.elastic_slip),
             State::Slip => {
                 let m = slip / length;
                 (m, (identity::<f64, D>() - outer(&m, &m)) * of_slip / length)
             }
         };
-        let of_pressure = outer(&q, &n) * -k;
+        let of_pressure = -outer(&q, &along);
         mutant!("contact: friction does not feel the change of pressure": of_pressure = Tensor::zeros());
         (of_pressure + of_q * pressure) * mu
     }
@@ -323,5 +377,67 @@ impl<const D: usize> ContactLaw<D> {
         let from_anchor = y - self.anchor.map(T::lit);
         mutant!("contact: the slip is not along the surface": { return from_anchor; });
         from_anchor - normal * normal.dot(&from_anchor)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use num_dual::Dual64;
+
+    /// The tangent against dual numbers, for gaps at both ends of a step, or at one instant.
+    #[test]
+    fn tangents_are_those_of_the_traction() {
+        let vector = |a: [f64; 3]| Vector::<f64, 3>::from(a);
+        let plane = Feature::Plane { point: Vector::zeros(), normal: vector([0.6, 0.0, 0.8]) };
+        let ball = Feature::Sphere { center: vector([-0.6, 0.0, -0.8]), radius: 1.0, sign: 1.0 };
+        // The distances from the surface at the start and in the middle, in which contact lasts, begins, ends and is passed.
+        for (before, middle) in [(-0.02, -0.03), (0.02, -0.03), (0.04, 0.01), (-0.05, -0.01), (-0.02, 0.03)] {
+            for (slip, friction) in [(0.0, 0.0), (1e-3, 0.3), (0.2, 0.3)] {
+                for feature in [plane.clone(), ball.clone()] {
+                    for start in [None, Some(vector([0.6, 0.0, 0.8]) * before + vector([0.01, 0.02, 0.0]))] {
+                        let y = vector([0.6, 0.0, 0.8]) * middle + vector([-0.01, 0.03, 0.02]);
+                        let anchor = y + vector([0.8, 0.3, -0.6]) * slip;
+                        let (feature, stiffness) = (feature.clone(), 50.0);
+                        let law = ContactLaw { feature, stiffness, friction, elastic_slip: 0.01, anchor, start };
+                        if start.is_none() && middle > 0.0 {
+                            continue;
+                        }
+                        for response in [Response::Pressure, Response::Friction] {
+                            let tangent = law.tangent(response, &y);
+                            for k in 0..3 {
+                                let seeded = Vector::from_fn(|i, _| Dual64::new(y[i], f64::from(i == k)));
+                                let dual = law.traction(response, &seeded).map(|t| -t.eps);
+                                let error = (tangent.column(k) - dual).norm();
+                                assert!(
+                                    error < 1e-12 * 50.0,
+                                    "{before}, {middle}, slip {slip}, {response:?}: {error:e}"
+                                );
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_work_of_the_mean_pressure_on_a_plane_is_the_change_of_the_potential() {
+        let normal = Vector::from([0.6, 0.8]);
+        for (before, after) in [(-0.02, -0.05), (0.02, -0.05), (-0.02, 0.05), (0.01, 0.02)] {
+            let (start, end) = (normal * before, normal * after + Vector::from([0.8, -0.6]) * 0.1);
+            let feature = Feature::Plane { point: Vector::zeros(), normal };
+            let law = ContactLaw {
+                feature,
+                stiffness: 3.0,
+                friction: 0.0,
+                elastic_slip: 0.01,
+                anchor: start,
+                start: Some(start),
+            };
+            let work = law.traction(Response::Pressure, &((start + end) * 0.5)).dot(&(end - start));
+            let energy = |gap: f64| 1.5 * gap.min(0.0).powi(2);
+            assert!((work + energy(after) - energy(before)).abs() < 1e-16, "{before}, {after}: {work}");
+        }
     }
 }

@@ -272,7 +272,7 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
 
     /// Whether the tangent is symmetric.
     pub fn is_symmetric(&self) -> bool {
-        !self.mixed && unsymmetric(self.step.bodies, self.step.loads).is_none()
+        !self.mixed && !self.step.alphas.discrete_gradient && unsymmetric(self.step.bodies, self.step.loads).is_none()
     }
 
     /// Sets the prescribed degrees of freedom of a field to zero.

@@ -189,7 +189,7 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     }
 }
 
-/// Bytes of the linearised tangent of all particles.
+/// Bytes of the linearised tangent of all particles. With `discrete_gradient` it is that of the mean stress of a step.
 ///
 /// ```
 /// use bfree::mechanics::{sweep::Supports, tangent::tangent_bytes};
@@ -199,15 +199,16 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
 /// let (particles, bodies) = (&simulation.particles, &simulation.bodies);
 /// let (supports, _) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
 /// // A neo-Hookean particle in 2D needs A, the symmetric B, κ and q: 9 numbers.
-/// assert!(tangent_bytes(particles, bodies, &supports) >= 9 * size_of::<f64>() * particles.len());
+/// assert!(tangent_bytes(particles, bodies, &supports, false) >= 9 * size_of::<f64>() * particles.len());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn tangent_bytes<const D: usize, L: Law>(
     particles: &Particles<D>,
     bodies: &[Body<L>],
     supports: &Supports<D>,
+    discrete_gradient: bool,
 ) -> usize {
-    let form: Form = Laws { particles, bodies, dt: 0.0 }.form();
+    let form: Form = Laws { particles, bodies, dt: 0.0, discrete_gradient }.form();
     supports.groups() * form.rows(D) * LANES * size_of::<f64>()
 }
 

@@ -127,7 +127,8 @@ impl<const D: usize, L: Law, A: ShapeFunction> Inventory<'_, D, L, A> {
 
     fn linear_systems(&self) -> Vec<Row> {
         let (nodes, simulation, supports) = (self.nodes, self.simulation, self.supports);
-        let linearized = tangent_bytes(&simulation.particles, &simulation.bodies, supports);
+        let linearized =
+            tangent_bytes(&simulation.particles, &simulation.bodies, supports, simulation.has_mean_stress());
         let averages = simulation.bodies.iter().any(Body::averages);
         // θ, and on a kept grid θ at the last reset; the cell, and the result of a loop over particles there.
         let dilatation_bytes = Cells::BYTES + NUMBER * if self.keeps_grid { 4 } else { 3 };

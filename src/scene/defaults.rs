@@ -4,7 +4,7 @@ use super::{Scene, accuracy, boundary, transfer};
 use crate::field::Field;
 use crate::material::{Law, PLASTIC_STRAIN};
 use crate::mechanics::reference::GridReset;
-use crate::mechanics::schemes::LONG_STEPS;
+use crate::mechanics::schemes::{LONG_STEPS, Parameters};
 use crate::problems::Problems;
 
 /// The strain up to which load steps keep a grid by themselves.
@@ -50,19 +50,27 @@ impl Scene {
     }
 
     /// ε, the lumped share of the mass. Bodies that touch obstacles or each other lose energy with a lumped mass, and a consistent one
-    /// makes the force of contact ring.
+    /// makes the force of contact ring. The energy that the energy–momentum scheme keeps is that of particles with a consistent mass.
     pub(super) fn lumping(&self) -> f64 {
-        let default = if self.has_contact() { LUMPING_IN_CONTACT } else { 1.0 };
+        let default = match self.time.scheme() {
+            Parameters::EnergyMomentum => 0.0,
+            _ if self.has_contact() => LUMPING_IN_CONTACT,
+            _ => 1.0,
+        };
         self.time.lumping.unwrap_or(default)
     }
 
-    /// When the grid is reset. A clamped body vibrates, and seldom meets anything. Obstacles need no reset either. Other bodies may come to
+    /// When the grid is reset. A clamped body vibrates, and seldom meets anything. Obstacles need no reset either, and a reset loses what the
+    /// energy–momentum scheme keeps. Other bodies may come to
     /// walls, and a grid that is reset in every step feels a wall from farther away.
     pub(super) fn grid_reset(&self) -> GridReset {
         let flip = self.transfer.is_none_or(|transfer| transfer == transfer::Transfer::Flip);
+        let keeps_energy = self.time.scheme() == Parameters::EnergyMomentum;
         self.grid.given_reset().unwrap_or(match self.time.scheme().has_inertia() {
             false => GridReset::Strain(STATIC_STRAIN),
-            true if flip && (self.is_clamped() || self.has_contact()) => GridReset::Strain(VIBRATION_STRAIN),
+            true if flip && (self.is_clamped() || self.has_contact() || keeps_energy) => {
+                GridReset::Strain(VIBRATION_STRAIN)
+            }
             true => GridReset::EveryStep,
         })
     }

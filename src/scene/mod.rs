@@ -43,10 +43,11 @@ pub use overrides::{Override, OverrideError};
 pub use read::{MAX_BYTES, SceneError, read, read_file};
 
 use crate::approximation;
-use crate::material::{Law, Material};
+use crate::material::{self, Law, Material};
 use crate::mechanics::loads::Rayleigh;
 use crate::mechanics::reference::GridReset;
 use crate::mechanics::schemes::Parameters;
+use crate::particles::Dilatation;
 use crate::shape::Layout;
 use crate::simulation::InitialGuess;
 use schemars::JsonSchema;
@@ -225,6 +226,9 @@ impl Scene {
         if self.time.scheme() == Parameters::ArcLength {
             self.refuse_off_path(&mut problems);
         }
+        if self.time.scheme() == Parameters::EnergyMomentum {
+            self.refuse_without_mean_stress(&mut problems);
+        }
         problems
     }
 
@@ -240,7 +244,8 @@ impl Scene {
         let rough =
             self.obstacles.iter().map(|obstacle| obstacle.friction).chain(self.contact.iter().map(|one| one.friction));
         let friction = friction.or(rough.fold(0.0, f64::max).gt(&0.0).then_some("contact with friction makes"));
-        if self.pressures.is_empty() { friction } else { Some("pressures make") }
+        let mean = (self.time.scheme() == Parameters::EnergyMomentum).then_some("the mean stress of a step makes");
+        if self.pressures.is_empty() { friction.or(mean) } else { Some("pressures make") }
     }
 
     /// Refuses keys that have a meaning only with inertia.
@@ -284,6 +289,19 @@ impl Scene {
         problems.require(self.contact.is_none(), "contact", "contact between bodies", allowed);
         let kept = self.grid.given_reset() != Some(GridReset::EveryStep);
         problems.require(kept, "grid.reset", "\"every_step\"", allowed);
+    }
+
+    /// Refuses bodies whose stress has no mean over a step.
+    fn refuse_without_mean_stress(&self, problems: &mut Problems) {
+        for (i, body) in self.bodies.iter().enumerate() {
+            let allowed = "must be \"pointwise\" with time.scheme \"energy_momentum\", which has no mean dilatation";
+            let pointwise = body.volumetric == Dilatation::Pointwise;
+            problems.require(pointwise, &format!("bodies[{i}].volumetric"), "\"mean_dilatation\"", allowed);
+            let turned = matches!(body.material, material::Parameters::Umat(_));
+            let allowed = "must not be \"umat\" with time.scheme \"energy_momentum\", which asks a law for the stress at states without the \
+                           rotation of the body";
+            problems.require(!turned, &format!("bodies[{i}].material"), "\"umat\"", allowed);
+        }
     }
 
     fn check_loads(&self, problems: &mut Problems, dimension: usize) {

@@ -34,7 +34,7 @@ pub struct Time {
     #[schemars(range(min = 0.5))]
     pub gamma: Option<f64>,
     /// ε of the mass matrix (1 − ε) M + ε lumped(M), 0 (consistent) to 1 (lumped). Default: 1; 0.1 with `obstacles`
-    /// or `contact`.
+    /// or `contact`; 0 with `"energy_momentum"`.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub lumping: Option<f64>,
     /// The starting point of Newton's method in a step. Default: `"last_step"` in load steps, `"zero"` with inertia.
@@ -132,7 +132,9 @@ impl Time {
         }
         self.scheme().check(problems, "time.scheme");
         for (key, given) in [("time.beta", self.beta), ("time.gamma", self.gamma)] {
-            if let (schemes::Parameters::GeneralizedAlpha(_), Some(given)) = (self.scheme(), given) {
+            let own =
+                matches!(self.scheme(), schemes::Parameters::GeneralizedAlpha(_) | schemes::Parameters::EnergyMomentum);
+            if let Some(given) = given.filter(|_| own) {
                 problems.refuse(key, Number(given), "belongs to time.scheme \"newmark\": remove one of the two");
             }
         }

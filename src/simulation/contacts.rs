@@ -6,6 +6,7 @@ use crate::material::Law;
 use crate::mechanics::contact::{Carrier, ContactPoint, Response, Surroundings, Touching, obstacle_points};
 use crate::mechanics::facing::{DEEPEST, Overlap, REACH, facing, overlaps};
 use crate::mechanics::loads::{Contacts, Facing, Obstacle, Pose};
+use crate::mechanics::schemes::Alphas;
 use crate::mechanics::terms::{ContactForce, Step, penalties};
 use crate::shape::Shape;
 use crate::tensor::Vector;
@@ -87,7 +88,9 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         if !contacts.exist() {
             return Ok(ContactUpdate::default());
         }
-        let end = Step { time: self.load() + self.clock.step(), ..*step };
+        // Forces at both ends are those of an instant.
+        let alphas = Alphas { discrete_gradient: false, ..step.alphas };
+        let end = Step { time: self.load() + self.clock.step(), alphas, ..*step };
         let motion = Motion {
             poses: [self.poses(self.load()), self.poses(end.time)],
             positions: self.point_positions(step, phi),
@@ -96,16 +99,21 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         self.check_entry(&motion.poses, &motion.positions)?;
         self.check_overlap(&motion)?;
         let mut update = self.untouched(&motion);
-        for one in &points_at(&end, phi) {
-            update.add_end(one, contacts, &motion);
-            update.add_work(one, &motion, &self.ends(one, &motion.positions));
-        }
+        let at_end = points_at(&end, phi);
+        at_end.iter().for_each(|one| update.add_end(one, contacts, &motion));
+        let mut work = |share, points: &[ContactPoint<f64, D>]| {
+            points.iter().for_each(|one| update.add_work(share, one, &motion, &self.ends(one, &motion.positions)));
+        };
         let before: Vec<_> = step.nodal.moved(step.supports.nodes()).collect();
-        let start = Step { time: self.load(), ..*step };
-        for one in points_at(&start, &before) {
-            mutant!("obstacles: the forces at the start of a step do no work": { break; });
-            update.add_work(&one, &motion, &self.ends(&one, &motion.positions));
+        if step.alphas.discrete_gradient {
+            let middle: Vec<_> = before.iter().zip(phi).map(|(before, phi)| (before + phi) * 0.5).collect();
+            work(1.0, &points_at(step, &middle));
+            return Ok(update);
         }
+        work(0.5, &at_end);
+        let start = Step { time: self.load(), ..end };
+        mutant!("obstacles: the forces at the start of a step do no work": { return Ok(update); });
+        work(0.5, &points_at(&start, &before));
         Ok(update)
     }
 
@@ -253,6 +261,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let (particles, penalties) = (&self.particles, penalties(&self.bodies, self.grid.spacing));
         let around = Surroundings {
             t: self.load(),
+            start: None,
             spacing: self.grid.spacing,
             stiffness: |p: usize| penalties[particles.body[p] as usize],
             position: |carrier: &Carrier<D>| particles.position[carrier.particle],
@@ -311,24 +320,30 @@ impl<const D: usize> ContactUpdate<D> {
         contact.depth = contact.depth.max(law.depth(y));
     }
 
-    /// Adds half the work of a force at one end of the step: the trapezoidal rule. An obstacle moves between the poses at both ends of the
+    /// Adds a share of the work of a force: half of it at each end of the step, or all of it in the middle. An obstacle moves between the poses at both ends of the
     /// step, and the point between the `positions`. Friction loses the work along the motion of the point relative to the obstacle or to the
     /// other body.
-    fn add_work(&mut self, one: &ContactPoint<f64, D>, motion: &Motion<D>, positions: &[Vector<f64, D>; 2]) {
+    fn add_work(
+        &mut self,
+        share: f64,
+        one: &ContactPoint<f64, D>,
+        motion: &Motion<D>,
+        positions: &[Vector<f64, D>; 2],
+    ) {
         let friction = one.law.traction(Response::Friction, &one.y) * one.area;
         let (contact, relative, work) = match one.touching {
             Touching::Obstacle(obstacle) => {
                 let [start, end] = [&motion.poses[0][obstacle], &motion.poses[1][obstacle]];
                 let moved = end.to_space(&one.y) - start.to_space(&one.y);
                 let relative = end.to_frame(&positions[1]) - start.to_frame(&positions[0]);
-                (&mut self.obstacles[obstacle], relative, 0.5 * one.force().dot(&moved))
+                (&mut self.obstacles[obstacle], relative, share * one.force().dot(&moved))
             }
             Touching::Pair { pair, .. } => {
                 let [start, end] = motion.relative[&one.number];
                 (&mut self.pairs[pair], end - start, 0.0)
             }
         };
-        let loss = -0.5 * friction.dot(&relative);
+        let loss = -share * friction.dot(&relative);
         mutant!("obstacles: friction loses nothing": loss = 0.0);
         contact.work += work;
         self.work += work;

@@ -196,6 +196,11 @@ impl<const D: usize, L: Law, A> Simulation<D, L, A> {
         (0..particles.len()).map(lost).sum()
     }
 
+    /// Whether the stress in the balance of forces is the mean stress of the step.
+    pub(crate) fn has_mean_stress(&self) -> bool {
+        self.settings.scheme.balance(self.clock.step()).discrete_gradient
+    }
+
     /// The method that solves the linear systems, and the reason for the choice.
     ///
     /// ```
@@ -211,6 +216,9 @@ impl<const D: usize, L: Law, A> Simulation<D, L, A> {
         let mut unsymmetric = unsymmetric(&self.bodies, &self.loads);
         if self.is_mixed() {
             unsymmetric = Some("the dilatations of averaged cells are unknowns, too");
+        }
+        if self.has_mean_stress() {
+            unsymmetric = Some("the mean stress of a step makes the tangent unsymmetric");
         }
         if self.settings.scheme.follows_path() {
             unsymmetric = Some("on a path of equilibria, the load is unknown too");

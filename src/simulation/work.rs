@@ -26,7 +26,8 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// The reactions, the work of the step, and the energy dissipated by damping and friction.
     ///
     /// A reaction is the force at t_{n+1} plus J/Δt, with J the impulse, summed over a prescribed condition. The work of all external
-    /// forces, including the reactions of moving walls, is Σ [½ (f_n + f_{n+1}) + J/Δt]·Δφ. In the mixed form, `dilatation` is that of the cells
+    /// forces, including the reactions of moving walls, is Σ [½ (f_n + f_{n+1}) + J/Δt]·Δφ; in the energy–momentum scheme the work of loads is
+    /// Σ f_{n+½}·Δφ. In the mixed form, `dilatation` is that of the cells
     /// at t_n.
     pub(super) fn accounts(
         &self,
@@ -72,16 +73,22 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
                 work += 0.5 * residual[dof.node][dof.component] * dof.step.increment;
             }
         }
-        work += mean_work(&end.external_force(phi)?, &start.external_force(&before)?, dphi);
-        let mut dissipated = 0.0;
-        if self.loads.damping.is_some() {
-            let lost = |equilibrium: &Equilibrium<'_, D, L>, phi| equilibrium.forces(Role::Dissipates, phi);
-            dissipated = mean_work(&lost(end, phi)?, &lost(&start, &before)?, dphi);
-        }
+        let middle: Vec<_> = before.iter().zip(phi).map(|(before, phi)| (before + phi) * 0.5).collect();
+        let work_of = |role| match balanced.step.alphas.discrete_gradient {
+            true => Ok(along(&balanced.forces(role, &middle)?, dphi)),
+            false => end.forces(role, phi).and_then(|end| Ok(mean_work(&end, &start.forces(role, &before)?, dphi))),
+        };
+        work -= work_of(Role::Loads)?;
+        let dissipated = if self.loads.damping.is_some() { work_of(Role::Dissipates)? } else { 0.0 };
         let contacts = self.contact_update(&balanced.step, phi)?;
         let (work, dissipated) = (work + contacts.work, dissipated + contacts.friction_loss);
         Ok(Accounts { reactions, work, dissipated, contacts })
     }
+}
+
+/// The work of a force along Δφ.
+fn along<const D: usize>(force: &[Vector<f64, D>], dphi: &[Vector<f64, D>]) -> f64 {
+    force.iter().zip(dphi).map(|(force, dphi)| force.dot(dphi)).sum()
 }
 
 /// The work of a force along Δφ, with the mean of its values at both ends of the step.

@@ -10,6 +10,7 @@ mod contact;
 mod damping;
 mod dilatation;
 mod dynamics;
+mod energy_momentum;
 mod equilibrium;
 mod examples;
 mod flow;

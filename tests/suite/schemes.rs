@@ -105,7 +105,7 @@ impl Display for BackwardEuler {
 impl Scheme for BackwardEuler {
     /// v = Δφ/Δt, a = (v − v_n)/Δt
     fn end(&self, dt: f64) -> Alphas {
-        Alphas { dt, a1: 1.0 / (dt * dt), a2: 1.0 / dt, a3: 0.0, a4: 1.0 / dt, a6: 0.0 }
+        Alphas { dt, a1: 1.0 / (dt * dt), a2: 1.0 / dt, a3: 0.0, a4: 1.0 / dt, a6: 0.0, discrete_gradient: false }
     }
 
     fn error_constant(&self) -> f64 {

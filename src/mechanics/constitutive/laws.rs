@@ -4,6 +4,7 @@
 //! their loops into vector instructions with the same bits. These loops are compiled once, here. Any other law keeps a plain loop.
 //! The loop of each body is chosen once a pass over the particles.
 
+use super::discrete_gradient::DiscreteGradient;
 use super::point::{self, Inadmissible, Part};
 use super::tangents::{Form, general};
 use crate::lanes::{LANES, Lanes, WithLanes, widest};
@@ -23,6 +24,8 @@ pub struct Laws<'a, const D: usize, L> {
     pub bodies: &'a [Body<L>],
     /// Δt
     pub dt: f64,
+    /// Whether the stress is the mean stress of the step, and the deformation that halfway.
+    pub discrete_gradient: bool,
 }
 
 /// A tensor by rows, a lane a particle. The first D·D entries are used.
@@ -42,6 +45,8 @@ struct States<'a, T> {
     dt: f64,
     /// The internal variables of each particle at t_n.
     internal: [&'a [f64]; LANES],
+    /// H_n of each particle by rows, for the mean stress of the step.
+    start: Option<[[f64; 9]; LANES]>,
 }
 
 impl<'a, T: Real> States<'a, T> {
@@ -50,7 +55,7 @@ impl<'a, T: Real> States<'a, T> {
         gradient[..D * D].copy_from_slice(at);
         // Empty lanes take the internal variables of the first particle.
         let internal = [particles.state(group[0] as usize, dt).internal; LANES];
-        let mut states = Self { gradient, h_r: [[0.0; LANES]; 9], volume: [0.0; LANES], dt, internal };
+        let mut states = Self { gradient, h_r: [[0.0; LANES]; 9], volume: [0.0; LANES], dt, internal, start: None };
         let reference = particles.reference();
         for (lane, &p) in group.iter().enumerate().take(LANES) {
             states.internal[lane] = particles.state(p as usize, dt).internal;
@@ -63,6 +68,23 @@ impl<'a, T: Real> States<'a, T> {
             states.volume[lane] = particles.volume[p as usize];
         }
         states
+    }
+
+    /// The same states, with H_n.
+    fn with_start<const D: usize>(mut self, particles: &Particles<D>, group: &[u32]) -> Self {
+        let mut start = [[0.0; 9]; LANES];
+        for (rows, &p) in start.iter_mut().zip(group) {
+            let h = &particles.displacement_gradient[p as usize];
+            rows[..D * D].copy_from_slice(h.transpose().as_slice());
+        }
+        self.start = Some(start);
+        self
+    }
+
+    /// The law whose stress is the mean stress of the step, of one particle.
+    fn mean<'s, L>(&'s self, law: &'s L, lane: usize) -> DiscreteGradient<'s, L> {
+        const AT_REST: [f64; 9] = [0.0; 9];
+        DiscreteGradient { law, start: self.start.as_ref().map_or(&AT_REST, |start| &start[lane]) }
     }
 
     /// ∇u, F of the last grid reset with the internal variables at t_n, and V₀ of one particle.
@@ -89,8 +111,18 @@ impl<const D: usize, L: Law> Laws<'_, D, L> {
             shipped.downcast::<Box<Evaluation<'static, T>>>().ok()
         };
         let of_body = self.evaluations(|law| match in_lanes(law) {
+            _ if self.discrete_gradient => Box::new(move |states, out, det_f| {
+                stresses_of::<T, D>(
+                    |lane, at, g, v| point::internal(&states.mean(law, lane), at, g, v, part),
+                    states,
+                    out,
+                    det_f,
+                );
+            }),
             Some(shipped) => *shipped,
-            None => Box::new(move |states, out, det_f| stresses_of::<L, T, D>(law, states, part, out, det_f)),
+            None => Box::new(move |states, out, det_f| {
+                stresses_of::<T, D>(|_, at, g, v| point::internal(law, at, g, v, part), states, out, det_f);
+            }),
         });
         move |group, at, sums| {
             let mut stresses = [[[T::zero(); LANES]; D]; D];
@@ -104,7 +136,9 @@ impl<const D: usize, L: Law> Laws<'_, D, L> {
 
     /// The smallest form that holds the tangents of all laws. It does not depend on the state.
     pub(crate) fn form(&self) -> Form {
-        self.bodies.iter().map(|body| form::<L, D>(&body.law)).max().unwrap_or(Form::Closed)
+        let all =
+            self.bodies.iter().map(|body| if self.discrete_gradient { Form::General } else { form::<L, D>(&body.law) });
+        all.max().unwrap_or(Form::Closed)
     }
 
     /// The point function that linearises the laws at ∇u and fills the rows of their tangents, for one pass.
@@ -113,11 +147,23 @@ impl<const D: usize, L: Law> Laws<'_, D, L> {
         part: Part,
         form: Form,
     ) -> impl Fn(Group<'_>, &At<f64, D, D>, &mut [[f64; LANES]]) -> Result<(), Inadmissible> + Sync {
+        let discrete_gradient = self.discrete_gradient;
         let of_body = self.evaluations(move |law| match material(law) {
+            _ if discrete_gradient => Box::new(move |states, out, det_f| {
+                tangents_of::<D>(
+                    |lane, at, g, v| point::linearize(&states.mean(law, lane), at, g, v, part),
+                    states,
+                    form,
+                    out,
+                    det_f,
+                );
+            }),
             Some(material) if part == Part::Whole && form != Form::General => {
                 shipped(material, D, Quantity::Tangent(form))
             }
-            _ => Box::new(move |states, out, det_f| tangents_of::<L, D>(law, states, part, form, out, det_f)),
+            _ => Box::new(move |states, out, det_f| {
+                tangents_of::<D>(|_, at, g, v| point::linearize(law, at, g, v, part), states, form, out, det_f);
+            }),
         });
         move |group, at, rows| self.evaluate(&of_body, group, at, rows)
     }
@@ -139,7 +185,10 @@ impl<const D: usize, L: Law> Laws<'_, D, L> {
         out: &mut [[T; LANES]],
     ) -> Result<(), Inadmissible> {
         let (group, mut det_f) = (group.particles, [1.0; LANES]);
-        let states = States::of(self.particles, self.dt, group, at.gradient.as_flattened());
+        let mut states = States::of(self.particles, self.dt, group, at.gradient.as_flattened());
+        if self.discrete_gradient {
+            states = states.with_start(self.particles, group);
+        }
         let body = |lane: usize| self.particles.body[group[lane] as usize];
         of_body[body(0) as usize](&states, out, &mut det_f);
         for lane in 1..group.len() {
@@ -177,12 +226,11 @@ fn form<L: Law, const D: usize>(law: &L) -> Form {
     }
 }
 
-/// σ and det F of every lane.
+/// σ and det F of every lane. `stress` gives them from the lane, F of the last grid reset, ∇u and V₀.
 #[inline(always)]
-fn stresses_of<L: Law, T: Real, const D: usize>(
-    law: &L,
+fn stresses_of<T: Real, const D: usize>(
+    stress: impl Fn(usize, &MaterialState<f64, D>, &Tensor<T, D>, f64) -> (Tensor<T, D>, f64),
     states: &States<'_, T>,
-    part: Part,
     out: &mut [[T; LANES]],
     det_f: &mut [f64; LANES],
 ) {
@@ -190,7 +238,7 @@ fn stresses_of<L: Law, T: Real, const D: usize>(
     let mut rows: Rows<T> = [[T::zero(); LANES]; 9];
     for lane in 0..LANES {
         let (gradient, at_r, volume) = states.of_lane::<D>(lane);
-        let (stress, det) = point::internal(law, &at_r, &gradient, volume, part);
+        let (stress, det) = stress(lane, &at_r, &gradient, volume);
         for i in 0..D {
             for k in 0..D {
                 rows[i * D + k][lane] = stress[(i, k)];
@@ -201,12 +249,11 @@ fn stresses_of<L: Law, T: Real, const D: usize>(
     out.copy_from_slice(&rows[..D * D]);
 }
 
-/// The tangents of every lane: those of `part`, stored in `form`.
+/// The tangents of every lane, stored in `form`. `linearize` gives them, and det F, like [`stresses_of`].
 #[inline(always)]
-fn tangents_of<L: Law, const D: usize>(
-    law: &L,
+fn tangents_of<const D: usize>(
+    linearize: impl Fn(usize, &MaterialState<f64, D>, &Tensor<f64, D>, f64) -> (point::LocalTangent<D>, f64),
     states: &States<'_, f64>,
-    part: Part,
     form: Form,
     out: &mut [[f64; LANES]],
     det_f: &mut [f64; LANES],
@@ -214,7 +261,7 @@ fn tangents_of<L: Law, const D: usize>(
     let mut rows: ClosedRows = [[0.0; LANES]; Form::ClosedWithBoth.rows(3)];
     for lane in 0..LANES {
         let (gradient, at_r, volume) = states.of_lane::<D>(lane);
-        let (tangent, det) = point::linearize(law, &at_r, &gradient, volume, part);
+        let (tangent, det) = linearize(lane, &at_r, &gradient, volume);
         det_f[lane] = det;
         match (tangent, form) {
             (point::LocalTangent::Closed(closed), Form::Closed | Form::ClosedWithBoth) => {
@@ -315,9 +362,11 @@ impl<L: Law, const D: usize> WithLanes for Evaluate<'_, L, D> {
     fn run<S: Lanes>(self, _: S) {
         let Self { law, quantity, states, out, det_f } = self;
         match quantity {
-            Quantity::Stress => stresses_of::<L, f64, D>(law, states, Part::Whole, out, det_f),
+            Quantity::Stress => {
+                stresses_of::<f64, D>(|_, at, g, v| point::internal(law, at, g, v, Part::Whole), states, out, det_f);
+            }
             Quantity::Tangent(form) => {
-                tangents_of::<L, D>(law, states, Part::Whole, form, out, det_f);
+                tangents_of::<D>(|_, at, g, v| point::linearize(law, at, g, v, Part::Whole), states, form, out, det_f);
             }
         }
     }

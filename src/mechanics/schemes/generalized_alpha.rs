@@ -61,7 +61,7 @@ impl Scheme for GeneralizedAlpha {
     /// μ a + (1−μ) a_n and θ v + (1−θ) v_n as functions of θ Δφ, with Newmark's α, θ = 1 − α_f and μ = 1 − α_m.
     fn balance(&self, dt: f64) -> Alphas {
         let (inertia, force) = self.weights();
-        let Alphas { a1, a2, a3, a4, a6, .. } = self.end(dt);
+        let Alphas { a1, a2, a3, a4, a6, discrete_gradient, .. } = self.end(dt);
         mutant!("schemes: the balance of generalised α has Newmark's α₃": a3 = (a3 + 1.0) / inertia - 1.0);
         Alphas {
             dt: force * dt,
@@ -70,6 +70,7 @@ impl Scheme for GeneralizedAlpha {
             a3: inertia * (a3 + 1.0) - 1.0,
             a4,
             a6: force * a6,
+            discrete_gradient,
         }
     }
 

@@ -5,11 +5,13 @@
 //! not depend on the scheme.
 
 mod arc_length;
+mod energy_momentum;
 mod generalized_alpha;
 mod newmark;
 mod statics;
 
 pub use arc_length::ArcLength;
+pub use energy_momentum::EnergyMomentum;
 pub use generalized_alpha::GeneralizedAlpha;
 pub use newmark::Newmark;
 pub use statics::Statics;
@@ -66,6 +68,10 @@ pub enum Parameters {
     /// Dynamics, by the generalised-α method of Chung and Hulbert. The method is of second order, and damps vibrations that the time step
     /// does not resolve.
     GeneralizedAlpha(GeneralizedAlpha),
+    /// Dynamics that keep energy, momentum and angular momentum for every step length: the midpoint rule with the mean stress of the step, a
+    /// discrete gradient of the strain energy, and with the mean pressure of contact. A grid reset still loses energy. Not for bodies with
+    /// mean dilatation or a UMAT.
+    EnergyMomentum,
     /// Statics: time only sets the loads and the prescribed motions.
     None,
     /// Quasi-statics along the equilibrium path, by arc length: loads may fall after they have risen (snap-through). The first step applies
@@ -80,6 +86,7 @@ impl Parameters {
         match *self {
             Self::Newmark => Arc::new(newmark),
             Self::GeneralizedAlpha(scheme) => Arc::new(scheme),
+            Self::EnergyMomentum => Arc::new(EnergyMomentum),
             Self::None => Arc::new(Statics),
             Self::ArcLength => Arc::new(ArcLength),
         }
@@ -118,11 +125,14 @@ pub struct Alphas {
     pub a3: f64,
     pub a4: f64,
     pub a6: f64,
+    /// Whether the stress and the pressures of contact beside them are means of the step, discrete gradients of their energies. Forces are
+    /// then in balance halfway, θ = ½.
+    pub discrete_gradient: bool,
 }
 
 impl Alphas {
     /// a = a_n for Δφ = 0: the equilibrium at the start of a step.
-    pub const START: Self = Self { dt: 0.0, a1: 1.0, a2: 0.0, a3: -1.0, a4: 0.0, a6: 0.0 };
+    pub const START: Self = Self { dt: 0.0, a1: 1.0, a2: 0.0, a3: -1.0, a4: 0.0, a6: 0.0, discrete_gradient: false };
 
     /// Δφ̂ from v_n and a_n: the motion increment that ends without acceleration. Δφ̂ exists only with inertia.
     ///

@@ -43,6 +43,7 @@ impl Newmark {
             a3: (1.0 - 2.0 * beta) / (2.0 * beta),
             a4: gamma / (beta * dt),
             a6: (1.0 - gamma / (2.0 * beta)) * dt,
+            discrete_gradient: false,
         }
     }
 }

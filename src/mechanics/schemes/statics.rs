@@ -16,7 +16,7 @@ impl Display for Statics {
 impl Scheme for Statics {
     /// There is no velocity and no acceleration.
     fn end(&self, dt: f64) -> Alphas {
-        Alphas { dt, a1: 0.0, a2: 0.0, a3: 0.0, a4: 0.0, a6: 0.0 }
+        Alphas { dt, a1: 0.0, a2: 0.0, a3: 0.0, a4: 0.0, a6: 0.0, discrete_gradient: false }
     }
 
     fn error_constant(&self) -> f64 {

@@ -35,10 +35,11 @@ impl<'a, const D: usize, L: Law> ContactForce<'a, D, L> {
 
     /// All points in contact at Δφ.
     pub(crate) fn contact_points<T: Number>(&self, dphi: &[Vector<T, D>]) -> Vec<ContactPoint<T, D>> {
-        let Step { particles, supports, loads, time, .. } = self.step;
+        let Step { particles, supports, loads, time, alphas, .. } = self.step;
         let reference = particles.reference().position;
         let around = Surroundings {
             t: time,
+            start: alphas.discrete_gradient.then_some((time - alphas.dt, &*particles.position)),
             spacing: supports.grid().spacing,
             stiffness: |p: usize| self.stiffness[particles.body[p] as usize],
             position: |carrier: &Carrier<D>| carrier.position(reference, supports, dphi),

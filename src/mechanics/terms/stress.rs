@@ -21,8 +21,11 @@ pub(crate) struct Stress<'a, const D: usize, L> {
 
 impl<'a, const D: usize, L: Law> Stress<'a, D, L> {
     pub(super) fn of(step: &Step<'a, D, L>) -> Self {
-        let Step { particles, bodies, dt, supports, .. } = *step;
-        Self { laws: Laws { particles, bodies, dt }, supports }
+        let Step { particles, bodies, dt, supports, alphas, .. } = *step;
+        let discrete_gradient = alphas.discrete_gradient;
+        // The mean stress is that of the whole step, and forces are in balance halfway.
+        let dt = if discrete_gradient { 2.0 * dt } else { dt };
+        Self { laws: Laws { particles, bodies, dt, discrete_gradient }, supports }
     }
 
     fn law(&self, p: usize) -> &L {
@@ -60,7 +63,7 @@ impl<const D: usize, L: Law> Term<D> for Stress<'_, D, L> {
     }
 
     fn energy<T: Number>(&self, dphi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>> {
-        if !self.laws.bodies.iter().all(|body| body.law.has_potential()) {
+        if self.laws.discrete_gradient || !self.laws.bodies.iter().all(|body| body.law.has_potential()) {
             return None;
         }
         let particles = self.laws.particles;

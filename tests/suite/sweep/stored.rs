@@ -63,10 +63,10 @@ fn frozen_bytes_are_those_of_the_tangent<const D: usize>(law: &Material) -> Resu
     let (bodies, general) = ([body(law.clone())], [body(Watched::unlisted(law.clone(), false))]);
     // Eight lanes per group, full or not.
     let lanes = 8 * tiled.windows().len();
-    assert_eq!(tangent_bytes(&particles, &bodies, &tiled), lanes * numbers * 8, "{D}D {law:?}");
-    assert_eq!(tangent_bytes(&particles, &general, &tiled), lanes * D.pow(4) * 8, "{D}D {law:?} by ℂmat");
+    assert_eq!(tangent_bytes(&particles, &bodies, &tiled, false), lanes * numbers * 8, "{D}D {law:?}");
+    assert_eq!(tangent_bytes(&particles, &general, &tiled, false), lanes * D.pow(4) * 8, "{D}D {law:?} by ℂmat");
     let lanes = 8 * positions.len().div_ceil(8);
-    assert_eq!(tangent_bytes(&particles, &bodies, &plain), lanes * numbers * 8);
+    assert_eq!(tangent_bytes(&particles, &bodies, &plain, false), lanes * numbers * 8);
     Ok(())
 }
 

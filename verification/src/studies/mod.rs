@@ -96,6 +96,7 @@ studies!(
     operator,
     patch,
     balance,
+    energy,
     symmetry,
     digits,
     black_box,

@@ -31,7 +31,7 @@ pub(super) fn body(lame: Lame, density: f64) -> Body<Material> {
 }
 
 /// Λ = G = 1, ρ = 1: a speed of sound of √3.
-pub(super) const PLAIN: Lame = Lame { lambda: 1.0, shear: 1.0 };
+pub(in crate::studies) const PLAIN: Lame = Lame { lambda: 1.0, shear: 1.0 };
 
 /// Fills the cells `from` … `to` with `per_axis` particles along each axis of a cell.
 pub(super) fn fill<const D: usize>(
@@ -59,7 +59,7 @@ pub(super) fn fill<const D: usize>(
 pub(super) const TOLERANCE: f64 = 1e-14;
 
 /// Settings with the tolerance [`TOLERANCE`].
-pub(super) fn settings(lumping: f64) -> Settings {
+pub(in crate::studies) fn settings(lumping: f64) -> Settings {
     Settings {
         lumping,
         newton: NewtonSettings {
@@ -86,7 +86,7 @@ pub(super) fn simulation<const D: usize>(
 }
 
 /// A block of 2ᴰ particles a cell, `cells` cells wide, in the middle of a box three times as wide, of spacing 1.
-pub(super) fn block<const D: usize>(cells: u32, approximation: Approximation, dt: f64) -> Simulation<D> {
+pub(in crate::studies) fn block<const D: usize>(cells: u32, approximation: Approximation, dt: f64) -> Simulation<D> {
     let grid = Grid { origin: Vector::zeros(), spacing: 1.0, cells: [3 * cells; D] };
     let mut particles = Particles::default();
     fill(&mut particles, &grid, ([cells; D], [2 * cells; D]), 2, (0, 1.0));
@@ -114,7 +114,7 @@ pub(super) fn gravity<const D: usize>(acceleration: Vector<f64, D>) -> Gravity<D
 }
 
 /// Gives the particles the velocity A (x − c), c being the middle of the box.
-pub(super) fn stir<const D: usize>(simulation: &mut Simulation<D>, a: &Tensor<f64, D>) {
+pub(in crate::studies) fn stir<const D: usize>(simulation: &mut Simulation<D>, a: &Tensor<f64, D>) {
     let grid = &simulation.grid;
     let centre = grid.origin + Vector::from_fn(|k, _| 0.5 * f64::from(grid.cells[k]) * grid.spacing);
     let particles = &mut simulation.particles;

@@ -4,7 +4,7 @@
 //! A solvable row holds its error against arithmetic of higher precision, an exact answer or a balance, with a bound from theory. A row to
 //! be refused holds the number of answers that differ from the expected error; the number must be zero.
 
-mod bodies;
+pub(super) mod bodies;
 mod contrast;
 mod crushed;
 mod deformations;

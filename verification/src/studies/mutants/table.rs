@@ -51,6 +51,9 @@ const RESTARTS: Check = Check::Test("restart::");
 const TOUCHES: Check = Check::Study("contact");
 const OBSTACLES: Check = Check::Test("obstacles::");
 const BETWEEN: Check = Check::Test("between::");
+const ENERGY: Check = Check::Study("energy");
+const MEAN: Check = Check::Unit("mechanics::constitutive::discrete_gradient");
+const CONTACT_LAW: Check = Check::Unit("mechanics::contact");
 const SOLVER: Check = Check::Unit("solver::");
 const SOLIDS: Check = Check::Unit("shape::");
 const STORED: Check = Check::Unit("checkpoint::");
@@ -133,6 +136,11 @@ pub(super) const FAULTS: &[ShippedFault] = &[
     fault("transfer: no strain resets the grid", KEPT, DYNAMICS),
     fault("transfer: affine fits lack their slope", TRANSFERS, DYNAMICS),
     fault("schemes: 1 for γ", DYNAMICS, POINTS),
+    fault("discrete gradient: ΔE is that of half the step", MEAN, POINTS),
+    fault("discrete gradient: Gauss's formula is not corrected", MEAN, POINTS),
+    fault("discrete gradient: all points move like the middle", ENERGY, POINTS),
+    fault("discrete gradient: the tangent has F of the middle on both sides", ENERGY, POINTS),
+    fault("contact: the mean pressure has the tangent of full contact", CONTACT_LAW, LAWS),
     fault("schemes: the balance of generalised α has Newmark's α₃", SCHEMES, TANGENT),
     fault("step: Δφ is the motion to the balance, not to the end", SCHEMES, TANGENT),
     fault("step: reactions and work lack the blow of a wall", LOADS, DYNAMICS),

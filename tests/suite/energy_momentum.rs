@@ -1,0 +1,112 @@
+//! The energy–momentum scheme, from scenes. Long runs and the tangent are in the study `energy`.
+
+use crate::support::{Failure, assert_refused, built, merged, scene, solid, with};
+use bfree::simulation::Simulation;
+use bfree::tensor::Vector;
+use serde_json::{Value, json};
+
+/// The cylinder of `rebound.json`, which stays in its place and spins and rings, on a grid that is kept.
+fn ringing(scheme: &str, step: f64) -> Result<Simulation<2>, Failure> {
+    let (scheme, step) = (format!("time.scheme={scheme}"), format!("time.step={step}"));
+    let kept = ["grid.reset=\"never\"", "time.lumping=0", "time.beta=null", "time.gamma=null", &scheme, &step];
+    let mut simulation = scene::<2>("rebound.json", &kept)?;
+    simulation.set_velocity_on_nodes(|x| {
+        let x = x - Vector::from([2.5, 2.5]);
+        Vector::from([-x[1], x[0]]) * 2.0 + Vector::from([x[0], -x[1]])
+    })?;
+    simulation.settings.newton.relative_tolerance = 1e-14;
+    Ok(simulation)
+}
+
+/// Energy and angular momentum around the origin.
+fn conserved(simulation: &Simulation<2>) -> [f64; 2] {
+    let of = &simulation.particles;
+    let moment =
+        |p: usize| of.mass[p] * (of.position[p][0] * of.velocity[p][1] - of.position[p][1] * of.velocity[p][0]);
+    [of.kinetic_energy() + simulation.strain_energy(), (0..of.len()).map(moment).sum()]
+}
+
+#[test]
+fn energy_and_angular_momentum_do_not_change_in_steps_that_the_midpoint_rule_does_not_survive() -> Result<(), Failure> {
+    let midpoint = r#"{"generalized_alpha": {"spectral_radius": 1}}"#;
+    let mut simulation = ringing("\"energy_momentum\"", 0.2)?;
+    let start = conserved(&simulation);
+    for n in 1..=60 {
+        simulation.step()?;
+        let change = |k: usize| (conserved(&simulation)[k] / start[k] - 1.0).abs();
+        assert!(change(0) < 1e-11 && change(1) < 1e-11, "step {n}: {:e}, {:e}", change(0), change(1));
+    }
+    // The largest strain energy is 0.3 of the energy: the steps are large.
+    let mut other = ringing(midpoint, 0.2)?;
+    assert!((0..60).any(|_| other.step().is_err()), "the midpoint rule has det F ≤ 0 in step 31");
+    Ok(())
+}
+
+#[test]
+fn it_is_of_second_order() -> Result<(), Failure> {
+    let after = |step: f64| -> Result<Vec<Vector<f64, 2>>, Failure> {
+        let mut simulation = ringing("\"energy_momentum\"", step)?;
+        while simulation.clock.time() < 0.4 - 1e-9 {
+            simulation.step()?;
+        }
+        Ok(simulation.particles.position.clone())
+    };
+    let (coarse, middle, fine) = (after(0.02)?, after(0.01)?, after(0.005)?);
+    let apart =
+        |a: &[Vector<f64, 2>], b: &[Vector<f64, 2>]| a.iter().zip(b).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+    let ratio = apart(&coarse, &middle) / apart(&middle, &fine);
+    // The next term of the error is smaller by Δt².
+    assert!((ratio - 4.0).abs() < 0.2, "{ratio}");
+    Ok(())
+}
+
+#[test]
+fn energy_is_kept_in_contact_with_friction_and_moving_obstacles() -> Result<(), Failure> {
+    // A square falls onto a belt that runs against it, slides and bounces.
+    let belt = json!({ "name": "belt", "shape": { "half_space": { "point": [0, 0.5], "normal": [0, 1] } }, "friction": 0.3,
+                       "velocity": [[0, [-1, 0]], [1, [-1, 0]]] });
+    let square = json!({ "box": { "min": [1, 0.52], "max": [1.5, 1.02] } });
+    let square = merged(solid("square", 1000, square), json!({ "velocity": [2, -1] }));
+    let mut scene = merged(falling(), json!({ "obstacles": [belt], "bodies": [square] }));
+    scene["grid"] = json!({ "size": [4, 2], "spacing": 0.125, "reset": "never" });
+    scene["gravity"] = json!({ "acceleration": [0, -5] });
+    scene["time"]["step"] = json!(0.004);
+    let mut simulation: Simulation<2> = built(&scene)?;
+    simulation.settings.newton.relative_tolerance = 1e-13;
+    let balance = |of: &Simulation<2>| {
+        of.particles.kinetic_energy() + of.strain_energy() + of.contact_energy() + of.dissipated - of.external_work
+    };
+    let (start, mut touched) = (balance(&simulation), false);
+    while simulation.clock.time() < 0.2 {
+        touched |= simulation.advance()?.touches();
+    }
+    let error = (balance(&simulation) / start - 1.0).abs();
+    assert!(touched && simulation.dissipated > 0.01 * start && error < 1e-11, "{error:e}");
+    Ok(())
+}
+
+fn falling() -> Value {
+    merged(
+        json!({"grid": {"size": [4, 4], "spacing": 0.5}, "time": {"step": 0.01, "end": 1, "scheme": "energy_momentum"}}),
+        json!({"approximation": "linear", "bodies": [solid("block", 10, json!({"box": {"min": [1, 1], "max": [2, 2]}}))]}),
+    )
+}
+
+#[test]
+fn what_has_no_mean_stress_is_refused() {
+    let refused = |pointer: &str, value: Value, path: &str, words: &[&str]| {
+        assert_refused(
+            &serde_json::to_string_pretty(&with(falling(), &[(pointer, value)])).unwrap_or_default(),
+            path,
+            words,
+        );
+    };
+    refused(
+        "/bodies/0/volumetric",
+        json!("mean_dilatation"),
+        "bodies[0].volumetric",
+        &["pointwise", "energy_momentum"],
+    );
+    refused("/time/beta", json!(0.25), "time.beta", &["newmark"]);
+    refused("/solver", json!({"krylov": {"method": "conjugate_gradient"}}), "solver.krylov.method", &["mean stress"]);
+}

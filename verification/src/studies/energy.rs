@@ -1,0 +1,188 @@
+//! The energy–momentum scheme: energy and angular momentum of long runs on a kept grid, and the tangent of the mean stress.
+
+use super::extremes::bodies;
+use super::patch::angular_momentum;
+use super::tangent::{SPACING, YOUNG, cloud};
+use super::{Effort, Outcome, StudyError, short, worse};
+use crate::check::regime::Regime;
+use crate::check::tangent::measure;
+use crate::prepared::Prepared;
+use crate::random::Random;
+use crate::report::{Bound, Report};
+use bfree::approximation::{Approximation, Bspline, Linear, Lme};
+use bfree::material::{Lame, Law, Material};
+use bfree::mechanics::reference::GridReset;
+use bfree::mechanics::schemes::{EnergyMomentum, GeneralizedAlpha, Newmark, Scheme};
+use bfree::simulation::Simulation;
+use bfree::tensor::{Tensor, Vector};
+use std::sync::Arc;
+
+pub(super) const ABOUT: &str = "the energy-momentum scheme: energy and angular momentum of long runs, and its tangent";
+
+/// The error of a product. c of the mean stress divides the round-off of two energies by |ΔE|².
+const TANGENT: f64 = 1e-10;
+
+/// The change of energy and of angular momentum that Newton's tolerance allows in 10⁴ steps, relative to the start.
+const CONSERVED: f64 = 1e-10;
+
+pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
+    let steps = if *effort == Effort::Full { 10_000 } else { 100 };
+    let reports = vec![tangents()?, long(steps), laws(), schemes()];
+    Ok(Outcome { reports, ..Outcome::default() })
+}
+
+/// Every law, dimension and regime: the pieces of the tangent against dual numbers.
+fn tangents() -> Result<Report, StudyError> {
+    let columns = ["quantity", "law", "D", "regime"];
+    let title = "tangent of the mean stress: |K u - dual(R) u| / |K u|, bound 1e-10";
+    let mut report = Report::new(title, &columns).as_matrix(&[0, 2, 1], 3, 3);
+    for (name, law) in Material::examples(Lame::from_young_poisson(YOUNG, 0.3)?) {
+        dimension::<1>(name, &law, &mut report)?;
+        dimension::<2>(name, &law, &mut report)?;
+        dimension::<3>(name, &law, &mut report)?;
+    }
+    report.note("Cubic functions. Gauss's formula is corrected where its error is above round-off.");
+    Ok(report)
+}
+
+fn dimension<const D: usize>(name: &str, law: &Material, report: &mut Report) -> Result<(), StudyError> {
+    for regime in Regime::GENERAL.into_iter().filter(|regime| regime.exists(D)) {
+        let mut random = Random::new(1);
+        let mut simulation = cloud::<D, Material>(law.clone(), Bspline::Cubic.into(), regime, &mut random)?;
+        simulation.loads.surface.clear();
+        let alphas = EnergyMomentum.balance(simulation.clock.step());
+        let prepared = Prepared { alphas, ..Prepared::new(&simulation)? };
+        let size = regime.increment() * SPACING;
+        let mut dphi: Vec<Vector<f64, D>> = random.field(prepared.nodes.len()).iter().map(|x| x * size).collect();
+        prepared.prescribe(&mut dphi);
+        for measured in measure(&prepared.equilibrium(&simulation), &dphi, SPACING, &mut random)? {
+            let of_stress = ["stress", "geometric", "material", "damping", "whole product", "diagonal blocks"];
+            if of_stress.contains(&measured.quantity.as_str()) {
+                let labels = [&measured.quantity, &*short(name), &D.to_string(), regime.name()];
+                report.push(&labels, measured.value, Bound::AtMost(TANGENT));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// A block that spins and rings on a grid that is kept, with a consistent mass. `courant` is the step over the time a wave needs for a cell.
+fn block<const D: usize>(shape: &Approximation, courant: f64, scheme: Arc<dyn Scheme>) -> Simulation<D> {
+    let sound = bodies::PLAIN.p_wave_modulus().sqrt();
+    let mut simulation = bodies::block::<D>(if D == 3 { 2 } else { 4 }, shape.clone(), courant / sound);
+    simulation.settings = bodies::settings(0.0);
+    simulation.settings.grid_reset = GridReset::Never;
+    simulation.settings.scheme = scheme;
+    // A turn by 0.2 in a step at the most, and strains of some percent.
+    let (spin, breath) = (0.02, 0.02);
+    let velocity = Tensor::<f64, D>::from_fn(|i, k| match (i, k) {
+        (0, 0) => breath,
+        (1, 1) => -0.7 * breath,
+        (0, 1) => -spin,
+        (1, 0) => spin,
+        _ => 0.0,
+    });
+    bodies::stir(&mut simulation, &(velocity * sound));
+    simulation
+}
+
+fn energy<const D: usize, L: Law>(simulation: &Simulation<D, L>) -> f64 {
+    simulation.particles.kinetic_energy() + simulation.strain_energy() + simulation.dissipated_by_laws()
+}
+
+/// The largest changes of `measured` over the steps, relative to the start.
+fn changes<const D: usize, const N: usize, L: Law>(
+    mut simulation: Simulation<D, L>,
+    steps: u32,
+    measured: impl Fn(&Simulation<D, L>) -> [f64; N],
+) -> Result<[f64; N], StudyError> {
+    let start = measured(&simulation);
+    (0..steps).try_fold([0.0; N], |worst, _| {
+        simulation.step()?;
+        let now = measured(&simulation);
+        Ok(std::array::from_fn(|k| worse(worst[k], (now[k] / start[k] - 1.0).abs())))
+    })
+}
+
+fn of_plane<L: Law>(simulation: &Simulation<2, L>) -> [f64; 2] {
+    [energy(simulation), angular_momentum(&simulation.particles)]
+}
+
+/// Energy and angular momentum over `steps` steps.
+fn long(steps: u32) -> Report {
+    let title = format!("a block that spins and rings, the grid kept, eps = 0: largest change in {steps} steps");
+    let mut report = Report::new(&title, &["shape functions", "Courant number", "change of"]);
+    let shapes = [("linear", Linear.into()), ("cubic", Bspline::Cubic.into()), ("LME 3", Lme::new(3.0, 1e-6).into())];
+    for (name, shape) in shapes {
+        for courant in [0.1, 1.0, 10.0] {
+            let labels = [name, &courant.to_string()];
+            let measured = changes(block::<2>(&shape, courant, Arc::new(EnergyMomentum)), steps, of_plane);
+            push(&mut report, &labels, &["energy", "angular momentum"], measured, Some(CONSERVED));
+        }
+    }
+    let solid = block::<3>(&Linear.into(), 10.0, Arc::new(EnergyMomentum));
+    let measured = changes(solid, steps.min(300), |simulation| [energy(simulation)]);
+    push(&mut report, &["linear, 3D", "10"], &["energy"], measured, Some(CONSERVED));
+    report
+}
+
+/// The energy of every law at a Courant number of 1; with the energy that the law says it dissipates.
+fn laws() -> Report {
+    let title = "the same for every law, quadratic functions, Courant number 1, 100 steps";
+    let mut report = Report::new(title, &["law", "grid", "change of"]);
+    // A body of soil that rings comes to the tip of its cone, where it has no stiffness.
+    let all = Material::examples(bodies::PLAIN).into_iter().filter(|(name, _)| *name != "Drucker-Prager");
+    for (name, law) in all {
+        let simulation = block::<2>(&Bspline::Quadratic.into(), 1.0, Arc::new(EnergyMomentum));
+        let measured = changes(simulation.with_laws(|_| law.clone()), 100, of_plane);
+        let bound = (name != "viscoelastic").then_some(CONSERVED);
+        push(&mut report, &[&*short(name), "kept"], &["energy", "angular momentum"], measured, bound);
+    }
+    report.note(
+        "With the energy that laws with memory report as dissipated. A viscoelastic law reports it with an error of the order of the step.",
+    );
+    report
+}
+
+/// What other schemes and a grid reset in every step change.
+fn schemes() -> Report {
+    let title = "other schemes, and the transfer alone: linear functions, 100 steps (shown)";
+    let mut report = Report::new(title, &["scheme", "grid, Courant number", "change of"]);
+    let all: [(&str, Arc<dyn Scheme>); 3] = [
+        ("Newmark", Arc::new(Newmark::default())),
+        ("midpoint rule", Arc::new(GeneralizedAlpha { spectral_radius: 1.0 })),
+        ("energy-momentum", Arc::new(EnergyMomentum)),
+    ];
+    for (name, scheme) in all {
+        for (grid, courant, reset, lumping) in [
+            ("kept, 1", 1.0, GridReset::Never, 0.0),
+            ("kept, 3", 3.0, GridReset::Never, 0.0),
+            ("reset in every step, lumped mass, 1", 1.0, GridReset::EveryStep, 1.0),
+        ] {
+            let mut simulation = block::<2>(&Linear.into(), courant, scheme.clone());
+            simulation.settings.grid_reset = reset;
+            simulation.settings.lumping = lumping;
+            let measured = changes(simulation, 100, of_plane);
+            push(&mut report, &[name, grid], &["energy", "angular momentum"], measured, None);
+        }
+    }
+    report
+}
+
+/// A row for each measured quantity, judged if it has a bound.
+fn push<const N: usize>(
+    report: &mut Report,
+    labels: &[&str; 2],
+    quantities: &[&str; N],
+    measured: Result<[f64; N], StudyError>,
+    bound: Option<f64>,
+) {
+    match measured {
+        Ok(values) => {
+            for (quantity, value) in quantities.iter().zip(values) {
+                report.push(&[labels[0], labels[1], quantity], value, bound.map_or(Bound::Reported, Bound::AtMost));
+            }
+        }
+        Err(error) => report.push_error(&[labels[0], labels[1], quantities[0]], error.as_ref()),
+    }
+}
