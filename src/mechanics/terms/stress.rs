@@ -22,10 +22,8 @@ pub(crate) struct Stress<'a, const D: usize, L> {
 impl<'a, const D: usize, L: Law> Stress<'a, D, L> {
     pub(super) fn of(step: &Step<'a, D, L>) -> Self {
         let Step { particles, bodies, dt, supports, alphas, .. } = *step;
-        let discrete_gradient = alphas.discrete_gradient;
-        // The mean stress is that of the whole step, and forces are in balance halfway.
-        let dt = if discrete_gradient { 2.0 * dt } else { dt };
-        Self { laws: Laws { particles, bodies, dt, discrete_gradient }, supports }
+        // Where forces are in balance halfway, a viscoelastic stress has relaxed for half the step.
+        Self { laws: Laws { particles, bodies, dt, discrete_gradient: alphas.discrete_gradient }, supports }
     }
 
     fn law(&self, p: usize) -> &L {

@@ -13,8 +13,10 @@ use bfree::approximation::{Approximation, Bspline, Linear, Lme};
 use bfree::material::{Lame, Law, Material};
 use bfree::mechanics::reference::GridReset;
 use bfree::mechanics::schemes::{EnergyMomentum, GeneralizedAlpha, Newmark, Scheme};
+use bfree::scene::{Override, read_file};
 use bfree::simulation::Simulation;
 use bfree::tensor::{Tensor, Vector};
+use std::path::Path;
 use std::sync::Arc;
 
 pub(super) const ABOUT: &str = "the energy-momentum scheme: energy and angular momentum of long runs, and its tangent";
@@ -22,12 +24,15 @@ pub(super) const ABOUT: &str = "the energy-momentum scheme: energy and angular m
 /// The error of a product. c of the mean stress divides the round-off of two energies by |ΔE|².
 const TANGENT: f64 = 1e-10;
 
+/// The energy that adaptive steps may lose in an impact.
+const ADAPTIVE: f64 = 0.01;
+
 /// The change of energy and of angular momentum that Newton's tolerance allows in 10⁴ steps, relative to the start.
 const CONSERVED: f64 = 1e-10;
 
 pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     let steps = if *effort == Effort::Full { 10_000 } else { 100 };
-    let reports = vec![tangents()?, long(steps), laws(), schemes()];
+    let reports = vec![tangents()?, long(steps), laws(), schemes(), floor(*effort)?];
     Ok(Outcome { reports, ..Outcome::default() })
 }
 
@@ -144,10 +149,9 @@ fn laws() -> Report {
     report
 }
 
-/// What other schemes and a grid reset in every step change.
+/// What other schemes change, and the transfer alone: a grid that is reset in every step.
 fn schemes() -> Report {
-    let title = "other schemes, and the transfer alone: linear functions, 100 steps (shown)";
-    let mut report = Report::new(title, &["scheme", "grid, Courant number", "change of"]);
+    let mut report = Report::new("other schemes, and grid resets: linear functions, 100 steps", &["scheme", "grid, Courant number", "change of"]);
     let all: [(&str, Arc<dyn Scheme>); 3] = [
         ("Newmark", Arc::new(Newmark::default())),
         ("midpoint rule", Arc::new(GeneralizedAlpha { spectral_radius: 1.0 })),
@@ -162,11 +166,53 @@ fn schemes() -> Report {
             let mut simulation = block::<2>(&Linear.into(), courant, scheme.clone());
             simulation.settings.grid_reset = reset;
             simulation.settings.lumping = lumping;
-            let measured = changes(simulation, 100, of_plane);
-            push(&mut report, &[name, grid], &["energy", "angular momentum"], measured, None);
+            let keeps = scheme.balance(1.0).discrete_gradient && reset == GridReset::Never;
+            push(&mut report, &[name, grid], &["energy", "angular momentum"], changes(simulation, 100, of_plane), keeps.then_some(CONSERVED));
         }
     }
     report
+}
+
+/// The energy balance of `bounce.json`: a disc bounces off a floor with friction, in fixed and in adaptive steps.
+fn floor(effort: Effort) -> Result<Report, StudyError> {
+    let title = "a disc bounces off a floor with friction, the grid kept, eps = 0: error of the energy balance over the energy at the start";
+    let mut report = Report::new(title, &["scheme", "steps", "error of"]);
+    let schemes = [("Newmark", "\"newmark\""), ("midpoint rule", r#"{"generalized_alpha": {"spectral_radius": 1}}"#), ("energy-momentum", "\"energy_momentum\"")];
+    // At short effort the longest steps alone.
+    let count = if effort == Effort::Full { 3 } else { 1 };
+    for (name, scheme) in schemes {
+        for step in [0.005, 0.0025, 0.00125].into_iter().take(count) {
+            let keys = [format!("time.step={step}")];
+            let bound = (name == "energy-momentum").then_some(CONSERVED);
+            push(&mut report, &[name, &format!("{step}")], &["energy balance"], bounce(scheme, &keys), bound);
+        }
+        if name != "midpoint rule" {
+            for tolerance in [1e-2, 1e-3, 1e-4].into_iter().take(count) {
+                let keys = ["time.step=0.01".to_owned(), format!("time.adaptive={{\"tolerance\": {tolerance}}}")];
+                let bound = if name == "Newmark" { ADAPTIVE } else { CONSERVED };
+                push(&mut report, &[name, &format!("adaptive, {tolerance:e}")], &["energy balance"], bounce(scheme, &keys), Some(bound));
+            }
+        }
+    }
+    report.note("The balance: kinetic, strain and contact energy and friction loss. The floor is a plane.");
+    Ok(report)
+}
+
+/// The largest error of the energy balance of `bounce.json` with other keys, over the energy at the start.
+fn bounce(scheme: &str, keys: &[String]) -> Result<[f64; 1], StudyError> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes");
+    let fixed = ["gravity=null", "time.lumping=0", "grid.reset=\"never\""].map(str::to_owned);
+    let keys = fixed.iter().chain(keys).cloned().chain([format!("time.scheme={scheme}")]);
+    let keys = keys.map(|key| key.parse()).collect::<Result<Vec<Override>, _>>()?;
+    let mut simulation: Simulation<2> = read_file(&folder.join("bounce.json"), &keys)?.build(&folder)?;
+    simulation.settings.newton.relative_tolerance = 1e-13;
+    let balance = |of: &Simulation<2>| of.particles.kinetic_energy() + of.strain_energy() + of.contact_energy() + of.dissipated;
+    let (start, mut worst) = (balance(&simulation), 0.0);
+    while simulation.clock.time() < 0.3 {
+        simulation.advance()?;
+        worst = super::worse(worst, (balance(&simulation) / start - 1.0).abs());
+    }
+    Ok([worst])
 }
 
 /// A row for each measured quantity, judged if it has a bound.
