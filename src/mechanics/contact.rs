@@ -10,9 +10,10 @@
 //!
 //! In the energy–momentum scheme, p is the mean over the step from the gap g_n to g_{n+1}, with the potential ψ = ½ k ⟨−g⟩²:
 //!
-//! p = −(ψ(g_{n+1}) − ψ(g_n))/(g_{n+1} − g_n),  y = ½ (y_n + y_{n+1})
+//! p = −(ψ(g_{n+1}) − ψ(g_n))/(g_{n+1} − g_n)
 //!
-//! Its work on a plane is the change of ψ, also in steps in which contact begins or ends.
+//! It acts along the normal at the middle of the step. Its work on a plane that does not turn is the change of ψ, also in steps in which
+//! contact begins or ends.
 //!
 //! Under large pressures ε grows to μ p/k. Friction in stick is then −k s, and has a potential.
 //!
@@ -51,8 +52,20 @@ pub(crate) struct ContactLaw<const D: usize> {
     elastic_slip: f64,
     /// a
     anchor: Vector<f64, D>,
-    /// y_n, where the pressure is the mean over the step.
-    start: Option<Vector<f64, D>>,
+    /// The ends of the step, where the pressure is the mean between them.
+    mean: Option<Ends<D>>,
+}
+
+/// Both ends of a step whose middle is the point y.
+#[derive(Clone, Debug)]
+struct Ends<const D: usize> {
+    /// g_n
+    gap: f64,
+    /// The surface at y_{n+1}.
+    feature: Feature<D>,
+    /// y_{n+1} = A y + b, in the frame that the obstacle has there.
+    map: Tensor<f64, D>,
+    shift: Vector<f64, D>,
 }
 
 /// The partner of a point in contact.
@@ -116,7 +129,8 @@ pub(crate) fn obstacle_points<T: Real, const D: usize>(
     >,
 ) -> Vec<ContactPoint<T, D>> {
     let poses_at = |t: f64| obstacles.iter().map(|obstacle| obstacle.pose(t)).collect::<Vec<Pose<D>>>();
-    let (poses, before) = (poses_at(*t), start.map(|(t, at)| (poses_at(t), at)));
+    let ends = start.map(|(t_n, at)| ([poses_at(t_n), poses_at(2.0 * t - t_n)], at));
+    let poses = poses_at(*t);
     let mut found = Vec::new();
     for (number, &SurfacePoint { particle, area, .. }) in points.iter().enumerate().filter(|_| !obstacles.is_empty()) {
         let carrier = Carrier::at(particle);
@@ -124,17 +138,27 @@ pub(crate) fn obstacle_points<T: Real, const D: usize>(
         for (index, (obstacle, pose)) in obstacles.iter().zip(&poses).enumerate() {
             let y = pose.rotation.map(T::lit).tr_mul(&(x - pose.shift.map(T::lit)));
             let at = y.map(T::value);
-            let start = before.as_ref().map(|(poses, at)| poses[index].to_frame(&at[particle]));
-            let touches = |y: &Vector<f64, D>| obstacle.shape.signed_distance(y) < 0.0;
+            let distance = |y: &Vector<f64, D>| obstacle.shape.signed_distance(y);
+            let mean = ends.as_ref().map(|([first, last], start)| {
+                // x_{n+1} = 2 x − x_n
+                let (x_n, last) = (&start[particle], last[index]);
+                let map = last.rotation.tr_mul(&pose.rotation) * 2.0;
+                let shift = last.rotation.tr_mul(&(pose.shift * 2.0 - x_n - last.shift));
+                let feature = obstacle.shape.feature(&(map * at + shift));
+                Ends { gap: distance(&first[index].to_frame(x_n)), feature, map, shift }
+            });
+            let deepest =
+                mean.as_ref().map_or(f64::INFINITY, |mean| mean.gap.min(distance(&(mean.map * at + mean.shift))));
             // NaN touches nothing.
-            if touches(&at) || start.is_some_and(|start| touches(&start) || touches(&(at * 2.0 - start))) {
+            let here = distance(&at);
+            if !here.is_nan() && here.min(deepest) < 0.0 {
                 let law = ContactLaw {
                     feature: obstacle.shape.feature(&at),
                     stiffness: obstacle.stiffness * stiffness(particle),
                     friction: obstacle.friction,
                     elastic_slip: ELASTIC_SLIP * spacing,
                     anchor: obstacle.anchors.get(number).copied().unwrap_or(at),
-                    start,
+                    mean,
                 };
                 let touching = Touching::Obstacle(index);
                 found.push(ContactPoint { touching, number, area, carriers: vec![carrier], pose: *pose, law, y });
@@ -168,11 +192,17 @@ fn pair_point<T: Real, const D: usize>(
     let carriers = one.carriers(contacts);
     let y: Vector<T, D> =
         carriers.iter().fold(Vector::zeros(), |y, carrier| y + position(carrier) * T::lit(carrier.share));
-    let start = start.map(|_| one.start);
-    let at = y.map(T::value);
-    let touches = |y: &Vector<f64, D>| one.normal.dot(y) < 0.0;
+    let feature = Feature::Plane { point: Vector::zeros(), normal: one.normal };
+    let gap = one.normal.dot(&y.map(T::value));
+    let mean = start.map(|_| Ends {
+        gap: one.normal.dot(&one.start),
+        feature: feature.clone(),
+        map: identity::<f64, D>() * 2.0,
+        shift: -one.start,
+    });
+    let deepest = mean.as_ref().map_or(gap, |mean| gap.min(mean.gap).min(2.0 * gap - mean.gap));
     // NaN touches nothing.
-    if !(touches(&at) || start.is_some_and(|start| touches(&start) || touches(&(at * 2.0 - start)))) {
+    if gap.is_nan() || deepest >= 0.0 {
         return None;
     }
     let softer = carriers.iter().map(|carrier| stiffness(carrier.particle)).fold(f64::INFINITY, f64::min);
@@ -181,12 +211,12 @@ fn pair_point<T: Real, const D: usize>(
     let anchor = one.start - slip;
     mutant!("contact: bodies forget their slip": anchor = one.start);
     let law = ContactLaw {
-        feature: Feature::Plane { point: Vector::zeros(), normal: one.normal },
+        feature,
         stiffness: between.stiffness * softer,
         friction: between.friction,
         elastic_slip: ELASTIC_SLIP * spacing,
         anchor,
-        start,
+        mean,
     };
     Some(ContactPoint {
         touching: Touching::Pair { pair: one.pair, is_first: one.is_first },
@@ -283,11 +313,10 @@ impl<const D: usize> ContactLaw<D> {
     }
 
     /// −∂p/∂y
-    fn stiffness_along(&self, y: &Vector<f64, D>) -> Vector<f64, D> {
-        let (Some((before, after)), Some(start)) = (self.gaps(y), self.start) else {
+    fn pressure_slope(&self, y: &Vector<f64, D>) -> Vector<f64, D> {
+        let (Some((before, after)), Some(mean)) = (self.gaps(y), &self.mean) else {
             return self.feature.at(y).normal * self.stiffness;
         };
-        // ∂g_{n+1}/∂y is twice the normal at y_{n+1}.
         let change = (after - before).powi(2);
         let share = match (before < 0.0, after < 0.0) {
             (true, true) => 1.0,
@@ -296,13 +325,15 @@ impl<const D: usize> ContactLaw<D> {
             (false, false) => 0.0,
         };
         mutant!("contact: the mean pressure has the tangent of full contact": share = 1.0);
-        self.feature.at(&(y * 2.0 - start)).normal * (share * self.stiffness)
+        // ∂g_{n+1}/∂y = Aᵀ n, which is twice the normal of an obstacle at rest.
+        mean.map.tr_mul(&mean.feature.at(&(mean.map * y + mean.shift)).normal) * (0.5 * share * self.stiffness)
     }
 
     /// g_n and g_{n+1}, where the pressure is the mean over the step.
     fn gaps<T: Real>(&self, y: &Vector<T, D>) -> Option<(T, T)> {
-        let start = self.start?.map(T::lit);
-        Some((self.feature.at(&start).distance, self.feature.at(&(y * T::lit(2.0) - start)).distance))
+        let mean = self.mean.as_ref()?;
+        let end = mean.map.map(T::lit) * y + mean.shift.map(T::lit);
+        Some((T::lit(mean.gap), mean.feature.at(&end).distance))
     }
 
     /// The state of friction at a slip of this length.
@@ -320,12 +351,12 @@ impl<const D: usize> ContactLaw<D> {
     /// −∂t/∂y of the traction t.
     pub fn tangent(&self, response: Response, y: &Vector<f64, D>) -> Tensor<f64, D> {
         let (n, pressure) = (self.feature.at(y).normal, self.pressure(y));
-        let (along, mu) = (self.stiffness_along(y), self.friction);
+        let (slope, mu) = (self.pressure_slope(y), self.friction);
         let curvature = self.feature.curvature(y);
         if response == Response::Pressure {
             mutant!("contact: the tangent lacks the curvature of the obstacle": curvature = Tensor::zeros());
             // −n ⊗ ∂p/∂y − p ∇²g, which is k (n ⊗ n + g ∇²g) at one instant
-            return outer(&n, &along) - curvature * pressure;
+            return outer(&n, &slope) - curvature * pressure;
         }
         let r = y - self.anchor;
         let slip = self.slip(y, &n);
@@ -341,7 +372,7 @@ impl<const D: usize> ContactLaw<D> {
                 (m, (identity::<f64, D>() - outer(&m, &m)) * of_slip / length)
             }
         };
-        let of_pressure = -outer(&q, &along);
+        let of_pressure = -outer(&q, &slope);
         mutant!("contact: friction does not feel the change of pressure": of_pressure = Tensor::zeros());
         (of_pressure + of_q * pressure) * mu
     }
@@ -385,6 +416,17 @@ mod tests {
     use super::*;
     use num_dual::Dual64;
 
+    /// The surface in a frame that is turned.
+    fn turned(feature: &Feature<3>, turn: &Tensor<f64, 3>) -> Feature<3> {
+        match feature {
+            Feature::Plane { point, normal } => Feature::Plane { point: turn * point, normal: turn * normal },
+            Feature::Sphere { center, radius, sign } => {
+                Feature::Sphere { center: turn * center, radius: *radius, sign: *sign }
+            }
+            other => other.clone(),
+        }
+    }
+
     /// The tangent against dual numbers, for gaps at both ends of a step, or at one instant.
     #[test]
     fn tangents_are_those_of_the_traction() {
@@ -396,10 +438,18 @@ mod tests {
             for (slip, friction) in [(0.0, 0.0), (1e-3, 0.3), (0.2, 0.3)] {
                 for feature in [plane.clone(), ball.clone()] {
                     for start in [None, Some(vector([0.6, 0.0, 0.8]) * before + vector([0.01, 0.02, 0.0]))] {
+                        let turn = Tensor::<f64, 3>::new(0.8, -0.6, 0.0, 0.6, 0.8, 0.0, 0.0, 0.0, 1.0);
                         let y = vector([0.6, 0.0, 0.8]) * middle + vector([-0.01, 0.03, 0.02]);
                         let anchor = y + vector([0.8, 0.3, -0.6]) * slip;
+                        // The frame turns, so that y_{n+1} is not 2y − y_n there.
+                        let mean = start.map(|start| Ends {
+                            gap: feature.at(&start).distance,
+                            feature: turned(&feature, &turn),
+                            map: turn * 2.0,
+                            shift: -(turn * start),
+                        });
                         let (feature, stiffness) = (feature.clone(), 50.0);
-                        let law = ContactLaw { feature, stiffness, friction, elastic_slip: 0.01, anchor, start };
+                        let law = ContactLaw { feature, stiffness, friction, elastic_slip: 0.01, anchor, mean };
                         if start.is_none() && middle > 0.0 {
                             continue;
                         }
@@ -427,14 +477,9 @@ mod tests {
         for (before, after) in [(-0.02, -0.05), (0.02, -0.05), (-0.02, 0.05), (0.01, 0.02)] {
             let (start, end) = (normal * before, normal * after + Vector::from([0.8, -0.6]) * 0.1);
             let feature = Feature::Plane { point: Vector::zeros(), normal };
-            let law = ContactLaw {
-                feature,
-                stiffness: 3.0,
-                friction: 0.0,
-                elastic_slip: 0.01,
-                anchor: start,
-                start: Some(start),
-            };
+            let map = identity::<f64, 2>() * 2.0;
+            let mean = Some(Ends { gap: before, feature: feature.clone(), map, shift: -start });
+            let law = ContactLaw { feature, stiffness: 3.0, friction: 0.0, elastic_slip: 0.01, anchor: start, mean };
             let work = law.traction(Response::Pressure, &((start + end) * 0.5)).dot(&(end - start));
             let energy = |gap: f64| 1.5 * gap.min(0.0).powi(2);
             assert!((work + energy(after) - energy(before)).abs() < 1e-16, "{before}, {after}: {work}");

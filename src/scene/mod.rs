@@ -297,10 +297,15 @@ impl Scene {
             let allowed = "must be \"pointwise\" with time.scheme \"energy_momentum\", which has no mean dilatation";
             let pointwise = body.volumetric == Dilatation::Pointwise;
             problems.require(pointwise, &format!("bodies[{i}].volumetric"), "\"mean_dilatation\"", allowed);
-            let turned = matches!(body.material, material::Parameters::Umat(_));
-            let allowed = "must not be \"umat\" with time.scheme \"energy_momentum\", which asks a law for the stress at states without the \
-                           rotation of the body";
-            problems.require(!turned, &format!("bodies[{i}].material"), "\"umat\"", allowed);
+            let library = match body.material {
+                material::Parameters::Umat(_) => "\"umat\"",
+                material::Parameters::Mfront(_) => "\"mfront\"",
+                material::Parameters::CLaw(_) => "\"c\"",
+                _ => continue,
+            };
+            let allowed = "must not be a law from a library with time.scheme \"energy_momentum\", which asks for the stress at states \
+                           without the rotation of the body";
+            problems.refuse(&format!("bodies[{i}].material"), library, allowed);
         }
     }
 

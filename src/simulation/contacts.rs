@@ -1,5 +1,6 @@
 //! Contact with obstacles and between bodies at the end of a step: forces, work, friction loss, and the new state of friction.
 
+use super::work::halfway;
 use super::{Simulation, StepError};
 use crate::approximation::ShapeFunction;
 use crate::material::Law;
@@ -106,8 +107,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         };
         let before: Vec<_> = step.nodal.moved(step.supports.nodes()).collect();
         if step.alphas.discrete_gradient {
-            let middle: Vec<_> = before.iter().zip(phi).map(|(before, phi)| (before + phi) * 0.5).collect();
-            work(1.0, &points_at(step, &middle));
+            work(1.0, &points_at(step, &halfway(&before, phi)));
             return Ok(update);
         }
         work(0.5, &at_end);

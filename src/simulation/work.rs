@@ -26,8 +26,8 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// The reactions, the work of the step, and the energy dissipated by damping and friction.
     ///
     /// A reaction is the force at t_{n+1} plus J/Δt, with J the impulse, summed over a prescribed condition. The work of all external
-    /// forces, including the reactions of moving walls, is Σ [½ (f_n + f_{n+1}) + J/Δt]·Δφ; in the energy–momentum scheme the work of loads is
-    /// Σ f_{n+½}·Δφ. In the mixed form, `dilatation` is that of the cells
+    /// forces, including the reactions of moving walls, is Σ [½ (f_n + f_{n+1}) + J/Δt]·Δφ; in the energy–momentum scheme it is
+    /// Σ (f_{n+½} + J/Δt)·Δφ. In the mixed form, `dilatation` is that of the cells
     /// at t_n.
     pub(super) fn accounts(
         &self,
@@ -46,7 +46,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             after.forces(Role::Stores, phi)?;
             end = &after;
         }
-        let conditions = &self.loads.prescribed;
+        let (conditions, is_mean) = (&self.loads.prescribed, balanced.step.alphas.discrete_gradient);
         let mut reactions = vec![Reaction { force: Vector::zeros(), torque: 0.0 }; conditions.len()];
         let mut work = 0.0;
         if !end.prescribed.is_empty() {
@@ -60,21 +60,25 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
                     let x = self.grid.position(self.grid.index(supports.active().ids()[dof.node])) + phi[dof.node];
                     reactions[dof.owner].torque += rotation.moment(&x, dof.component, reaction + blow);
                 }
-                work += (0.5 * reaction + blow) * dof.step.increment;
+                work += (if is_mean { blow } else { 0.5 * reaction + blow }) * dof.step.increment;
             }
         }
         // At t_n: a = a_n and Δφ = 0.
         let before = supports.pool().collect(nodal.moved(supports.nodes()));
         let start = self.equilibrium(supports, nodal, end.prescribed, Alphas::START, t);
+        let middle = if is_mean { halfway(&before, phi) } else { Vec::new() };
         if end.prescribed.iter().any(|dof| dof.moving) {
             let mut residual: Pooled<Vector<f64, D>> = supports.field();
-            start.residual_into(Trial { dphi: &before, dilatation }, &mut residual)?;
+            let share = if is_mean { 1.0 } else { 0.5 };
+            match is_mean {
+                true => balanced.residual_into(Trial::motion(&middle), &mut residual)?,
+                false => start.residual_into(Trial { dphi: &before, dilatation }, &mut residual)?,
+            }
             for dof in end.prescribed {
-                work += 0.5 * residual[dof.node][dof.component] * dof.step.increment;
+                work += share * residual[dof.node][dof.component] * dof.step.increment;
             }
         }
-        let middle: Vec<_> = before.iter().zip(phi).map(|(before, phi)| (before + phi) * 0.5).collect();
-        let work_of = |role| match balanced.step.alphas.discrete_gradient {
+        let work_of = |role| match is_mean {
             true => Ok(along(&balanced.forces(role, &middle)?, dphi)),
             false => end.forces(role, phi).and_then(|end| Ok(mean_work(&end, &start.forces(role, &before)?, dphi))),
         };
@@ -84,6 +88,11 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let (work, dissipated) = (work + contacts.work, dissipated + contacts.friction_loss);
         Ok(Accounts { reactions, work, dissipated, contacts })
     }
+}
+
+/// The motion in the middle of a step.
+pub(super) fn halfway<const D: usize>(before: &[Vector<f64, D>], after: &[Vector<f64, D>]) -> Vec<Vector<f64, D>> {
+    before.iter().zip(after).map(|(before, after)| (before + after) * 0.5).collect()
 }
 
 /// The work of a force along Δφ.

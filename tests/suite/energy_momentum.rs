@@ -41,9 +41,8 @@ fn energy_and_angular_momentum_do_not_change_in_steps_that_the_midpoint_rule_doe
         let change = |k: usize| (conserved(&simulation)[k] / start[k] - 1.0).abs();
         assert!(change(0) < 1e-11 && change(1) < 1e-11, "step {n}: {:e}, {:e}", change(0), change(1));
     }
-    // The largest strain energy is 0.3 of the energy: the steps are large.
     let mut other = ringing(midpoint, 0.2)?;
-    assert!((0..60).any(|_| other.step().is_err()), "the midpoint rule has det F ≤ 0 in step 31");
+    assert!((0..60).any(|_| other.step().is_err()), "the midpoint rule survives these steps");
     Ok(())
 }
 
@@ -90,6 +89,46 @@ fn energy_is_kept_in_contact_with_friction_and_moving_obstacles() -> Result<(), 
     }
     let error = (balance(&simulation) / start - 1.0).abs();
     assert!(touched && simulation.dissipated > 0.01 * start && error < 1e-11, "{error:e}");
+    Ok(())
+}
+
+#[test]
+fn the_work_of_a_moving_wall_closes_the_balance() -> Result<(), Failure> {
+    let square = solid("square", 1000, json!({ "box": { "min": [0, 0], "max": [1, 1] } }));
+    let pulled = json!({ "left": { "velocity": [[0, [0, 0]], [0.1, [0, 2]]] } });
+    let mut scene = merged(falling(), json!({ "bodies": [square], "boundary": pulled }));
+    scene["grid"] = json!({ "size": [4, 2], "spacing": 0.125, "reset": "never" });
+    let mut simulation: Simulation<2> = built(&scene)?;
+    simulation.settings.newton.relative_tolerance = 1e-13;
+    while simulation.clock.time() < 0.2 {
+        simulation.step()?;
+    }
+    let stored = simulation.particles.kinetic_energy() + simulation.strain_energy();
+    let error = (stored / simulation.external_work - 1.0).abs();
+    assert!(stored > 0.1 && error < 1e-10, "{error:e} of {stored}");
+    Ok(())
+}
+
+#[test]
+fn a_smooth_drum_that_turns_is_a_drum_at_rest() -> Result<(), Failure> {
+    let after = |motion: Value| -> Result<Vec<Vector<f64, 2>>, Failure> {
+        let drum = json!({ "name": "drum", "shape": { "ball": { "center": [1.3, 0.4], "radius": 0.4 } } });
+        let square = json!({ "box": { "min": [1, 0.81], "max": [1.5, 1.31] } });
+        let square = merged(solid("square", 1000, square), json!({ "velocity": [0.1, -1] }));
+        let mut scene = merged(falling(), json!({ "obstacles": [merged(drum, motion)], "bodies": [square] }));
+        scene["grid"] = json!({ "size": [4, 2], "spacing": 0.125, "reset": "never" });
+        let mut simulation: Simulation<2> = built(&scene)?;
+        let mut touched = false;
+        for _ in 0..15 {
+            touched |= simulation.step()?.touches();
+        }
+        assert!(touched);
+        Ok(simulation.particles.by_id().position.to_vec())
+    };
+    let (rest, turning) =
+        (after(json!({}))?, after(json!({ "rotation": { "center": [1.3, 0.4], "angle": [[0, 0], [1, 5]] } }))?);
+    let apart = rest.iter().zip(&turning).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+    assert!(apart < 1e-9, "{apart:e}");
     Ok(())
 }
 

@@ -12,7 +12,7 @@
 //! ```
 //!
 //! Gonzalez (Comput. Methods Appl. Mech. Eng. 190, 2000) has one point. His c has no digits left for small ΔE. With three points the quadrature
-//! is then exact to round-off, and c is left out. A law without a potential has no c.
+//! of a smooth law is then exact to round-off, and c is left out. A law without a potential has no c.
 //!
 //! The unknown is H_½. With δE_{n+1} = sym(F_{n+1}ᵀ δF_{n+1}) and δF_{n+1} = 2 δF_½,
 //!
@@ -31,7 +31,7 @@ use crate::tensor::{Deformation, Tensor, Vector, contract, identity, outer, scal
 const GAUSS: [(f64, f64); 3] =
     [(0.112_701_665_379_258_31, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
 
-/// The error of W and of S_G : ΔE, relative to their magnitudes, by round-off.
+/// The error of W and of S_G : ΔE by round-off, relative to their magnitudes.
 const ROUND_OFF: f64 = 16.0 * f64::EPSILON;
 
 /// A law whose stress at H_½ is the mean stress S̄ of the step from H_n. W and the internal variables are those of the law.
@@ -54,10 +54,12 @@ impl<L: Law> DiscreteGradient<'_, L> {
         scaled(&half, T::lit(2.0))
     }
 
-    /// The state with the strain E_n + s ΔE. It has no rotation, which S does not feel.
+    /// The state with the strain E_n + s ΔE. It has no rotation, which S does not feel. A law with a potential takes the same time, half the
+    /// step, at all points, so that W is one function; any other law sees the rate of the step.
     fn state<'s, T: Real, const D: usize>(&self, middle: &MaterialState<'s, T, D>, s: f64) -> MaterialState<'s, T, D> {
         let strain = Deformation::new(self.start::<T, D>()).green_lagrange();
-        middle.deformed(stretch(&(strain + scaled(&self.growth(middle), T::lit(s)))))
+        let dt = if self.law.has_potential() { middle.dt } else { 2.0 * s * middle.dt };
+        middle.deformed(stretch(&(strain + scaled(&self.growth(middle), T::lit(s))))).in_step(dt, middle.internal)
     }
 
     /// S_G
@@ -79,7 +81,12 @@ impl<L: Law> DiscreteGradient<'_, L> {
         let work = contract(integral, &growth);
         let [before, after] = [0.0, 1.0].map(|s| self.law.energy(&self.state(middle, s)));
         let missing = after - before - work;
-        let size = before.value().abs() + after.value().abs() + work.value().abs();
+        let mut size = before.value().abs() + after.value().abs() + work.value().abs();
+        // A plastic law has its elastic strain from C and the plastic strain, which cancel.
+        if !self.law.internal_variables().is_empty() {
+            let stretched = contract(&middle.f, &middle.f).value();
+            size += contract(integral, integral).value().sqrt() * stretched;
+        }
         mutant!("discrete gradient: Gauss's formula is not corrected": { return None; });
         (missing.value().abs() > ROUND_OFF * size).then(|| missing / contract(&growth, &growth))
     }

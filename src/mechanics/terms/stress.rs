@@ -22,7 +22,6 @@ pub(crate) struct Stress<'a, const D: usize, L> {
 impl<'a, const D: usize, L: Law> Stress<'a, D, L> {
     pub(super) fn of(step: &Step<'a, D, L>) -> Self {
         let Step { particles, bodies, dt, supports, alphas, .. } = *step;
-        // Where forces are in balance halfway, a viscoelastic stress has relaxed for half the step.
         Self { laws: Laws { particles, bodies, dt, discrete_gradient: alphas.discrete_gradient }, supports }
     }
 
