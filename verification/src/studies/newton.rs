@@ -1,4 +1,4 @@
-//! The convergence of Newton's method on steps of the rebound. The study `rebound` compares with the paper's Table 3.
+//! The convergence of Newton's method on steps of the rebound, and on steps in which a disc meets and leaves a floor with friction. The study `rebound` compares with the paper's Table 3.
 
 use super::{Effort, Outcome, StudyError};
 use crate::prepared::Prepared;
@@ -14,7 +14,7 @@ use bfree::solver::{
 };
 use bfree::tensor::Vector;
 
-pub(super) const ABOUT: &str = "observed orders of Newton's method on steps of the rebound";
+pub(super) const ABOUT: &str = "observed orders of Newton's method on steps of the rebound, and where contact with friction begins and ends";
 
 /// A step of a scene, started from the converged state before it.
 struct Case {
@@ -24,10 +24,12 @@ struct Case {
     end: f64,
 }
 
-const CASES: [Case; 3] = [
+const CASES: [Case; 5] = [
     Case { name: "v=0.5, t=21.8", scene: "rebound", end: 21.8 },
     Case { name: "v=0.5, t=22.0", scene: "rebound", end: 22.0 },
     Case { name: "v=2.5, t=4.4", scene: "rebound_fast", end: 4.4 },
+    Case { name: "contact begins", scene: "bounce", end: 0.0675 },
+    Case { name: "contact ends", scene: "bounce", end: 0.1725 },
 ];
 
 const LUMPINGS: [(f64, &str); 4] = [(1.0, "1 (lumped)"), (0.5, "0.5"), (0.01, "0.01"), (0.0, "0 (consistent)")];
@@ -76,8 +78,8 @@ impl Method {
 pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     let mut study = Study::new();
     for (lumping, label) in LUMPINGS {
-        for scene in ["rebound", "rebound_fast"] {
-            let mut simulation = rebound(scene, if lumping == 0.0 { LEAST_LUMPING } else { lumping })?;
+        for scene in ["rebound", "rebound_fast", "bounce"] {
+            let mut simulation = scene_at_start(scene, if lumping == 0.0 { LEAST_LUMPING } else { lumping })?;
             for case in CASES.iter().filter(|case| case.scene == scene) {
                 let start = case.start(&simulation);
                 reach(&mut simulation, start)?;
@@ -104,10 +106,10 @@ impl Case {
     }
 }
 
-/// A rebound at t = 0.
-fn rebound(scene: &str, lumping: f64) -> Result<Simulation<2, Material>, StudyError> {
+/// A scene at t = 0, whose grid is reset in every step.
+fn scene_at_start(scene: &str, lumping: f64) -> Result<Simulation<2, Material>, StudyError> {
     let lumping = format!("time.lumping={lumping}");
-    shipped::simulation(scene, &[lumping.as_str(), RESTART])
+    shipped::simulation(scene, &[lumping.as_str(), RESTART, "grid.reset=\"every_step\""])
 }
 
 /// Runs to the start of a step.
