@@ -26,6 +26,7 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     reports.push(indentation::patch()?);
     if *effort == Effort::Full {
         reports.push(indentation::hertz()?);
+        reports.push(indentation::point()?);
     }
     Ok(Outcome { reports, tables: vec![table], ..Outcome::default() })
 }
