@@ -2,7 +2,7 @@
 
 use super::container::Arrays;
 use crate::clock::Reached;
-use crate::mechanics::loads::{Contacts, Loads, Obstacle, Reaction};
+use crate::mechanics::loads::{Contacts, Loads, Obstacle, Reaction, RigidBody};
 use crate::mechanics::path::Path;
 use crate::mechanics::reference::LastEquilibrium;
 use crate::mechanics::transfer::Nodal;
@@ -95,10 +95,11 @@ pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) 
     arrays
 }
 
-/// Work, friction loss and anchors of every obstacle; stored energy, friction losses and slips between bodies.
+/// Work, friction loss, anchors and free motion of every obstacle; stored energy, friction losses and slips between bodies.
 fn contact_state<const D: usize>(contacts: &Contacts<D>) -> Vec<f64> {
     let of = |one: &Obstacle<D>| {
-        [one.work, one.friction_loss].into_iter().chain(one.anchors.iter().flatten().copied()).collect::<Vec<_>>()
+        let losses = [one.work, one.friction_loss].into_iter().chain(one.anchors.iter().flatten().copied());
+        losses.chain(one.free.iter().flat_map(RigidBody::state)).collect::<Vec<_>>()
     };
     let mut all: Vec<f64> = contacts.obstacles.iter().flat_map(of).collect();
     if let Some(between) = &contacts.between {
@@ -117,7 +118,7 @@ fn set_contact_state<const D: usize>(contacts: &mut Contacts<D>, mut numbers: &[
         let anchors: &mut [f64] = bytemuck::cast_slice_mut(&mut one.anchors);
         let (own, others) = rest.split_at(anchors.len().min(rest.len()));
         anchors.copy_from_slice(own);
-        numbers = others;
+        numbers = one.free.as_mut().map_or(others, |body| body.set_state(others));
     }
     if let (Some(between), [energy, rest @ ..]) = (&mut contacts.between, numbers) {
         between.energy = *energy;

@@ -100,7 +100,7 @@ pub(crate) struct ContactPoint<T, const D: usize> {
     /// The places whose positions, times their shares, sum to the position of the point; relative to the other body, where it touches one.
     pub carriers: Vec<Carrier<D>>,
     /// The pose of the obstacle. A pair has the frame of space.
-    pub pose: Pose<D>,
+    pub pose: Pose<D, T>,
     /// The law there.
     pub law: ContactLaw<D>,
     /// The position of the point in the frame of the obstacle, or relative to the place on the other body.
@@ -118,54 +118,82 @@ pub(crate) struct Surroundings<'a, S, P, const D: usize> {
     pub position: P,
 }
 
-/// All points that touch an obstacle.
+/// The poses of all obstacles at t_n and t_{n+1}, and the positions of the particles at t_n, where pressures are means over the step.
+type StepEnds<'a, const D: usize> = Option<([Vec<Pose<D>>; 2], &'a [Vector<f64, D>])>;
+
+/// All points that touch an obstacle, with the poses of all obstacles.
 pub(crate) fn obstacle_points<T: Real, const D: usize>(
+    contacts: &Contacts<D>,
+    around: &Surroundings<'_, impl Fn(usize) -> f64, impl Fn(&Carrier<D>) -> Vector<T, D>, D>,
+    poses: &[Pose<D, T>],
+) -> Vec<ContactPoint<T, D>> {
+    let Contacts { points, obstacles, .. } = contacts;
+    let poses_at = |t: f64| obstacles.iter().map(|obstacle| obstacle.pose(t)).collect::<Vec<Pose<D>>>();
+    let ends = around.start.map(|(t_n, at)| ([poses_at(t_n), poses_at(2.0 * around.t - t_n)], at));
+    let mut found = Vec::new();
+    for number in (0..points.len()).filter(|_| !obstacles.is_empty()) {
+        let x = (around.position)(&Carrier::at(points[number].particle));
+        let touched = |(index, pose)| obstacle_point(contacts, around, &ends, (number, &x), (index, pose));
+        found.extend(poses.iter().enumerate().filter_map(touched));
+    }
+    found
+}
+
+/// All points that touch a free obstacle in a pose.
+pub(crate) fn points_on<T: Real, const D: usize>(
+    contacts: &Contacts<D>,
+    around: &Surroundings<'_, impl Fn(usize) -> f64, impl Fn(&Carrier<D>) -> Vector<T, D>, D>,
+    index: usize,
+    pose: &Pose<D, T>,
+) -> Vec<ContactPoint<T, D>> {
+    let point = |(number, point): (usize, &SurfacePoint<D>)| {
+        let x = (around.position)(&Carrier::at(point.particle));
+        obstacle_point(contacts, around, &None, (number, &x), (index, pose))
+    };
+    contacts.points.iter().enumerate().filter_map(point).collect()
+}
+
+/// The contact of a point with an obstacle; `None` without contact.
+fn obstacle_point<T: Real, const D: usize>(
     Contacts { points, obstacles, .. }: &Contacts<D>,
-    Surroundings { t, start, spacing, stiffness, position }: &Surroundings<
+    Surroundings { spacing, stiffness, .. }: &Surroundings<
         '_,
         impl Fn(usize) -> f64,
         impl Fn(&Carrier<D>) -> Vector<T, D>,
         D,
     >,
-) -> Vec<ContactPoint<T, D>> {
-    let poses_at = |t: f64| obstacles.iter().map(|obstacle| obstacle.pose(t)).collect::<Vec<Pose<D>>>();
-    let ends = start.map(|(t_n, at)| ([poses_at(t_n), poses_at(2.0 * t - t_n)], at));
-    let poses = poses_at(*t);
-    let mut found = Vec::new();
-    for (number, &SurfacePoint { particle, area, .. }) in points.iter().enumerate().filter(|_| !obstacles.is_empty()) {
-        let carrier = Carrier::at(particle);
-        let x = position(&carrier);
-        for (index, (obstacle, pose)) in obstacles.iter().zip(&poses).enumerate() {
-            let y = pose.rotation.map(T::lit).tr_mul(&(x - pose.shift.map(T::lit)));
-            let at = y.map(T::value);
-            let distance = |y: &Vector<f64, D>| obstacle.shape.signed_distance(y);
-            let mean = ends.as_ref().map(|([first, last], start)| {
-                // x_{n+1} = 2 x − x_n
-                let (x_n, last) = (&start[particle], last[index]);
-                let map = last.rotation.tr_mul(&pose.rotation) * 2.0;
-                let shift = last.rotation.tr_mul(&(pose.shift * 2.0 - x_n - last.shift));
-                let feature = obstacle.shape.feature(&(map * at + shift));
-                Ends { gap: distance(&first[index].to_frame(x_n)), feature, map, shift }
-            });
-            let deepest =
-                mean.as_ref().map_or(f64::INFINITY, |mean| mean.gap.min(distance(&(mean.map * at + mean.shift))));
-            // NaN touches nothing.
-            let here = distance(&at);
-            if !here.is_nan() && here.min(deepest) < 0.0 {
-                let law = ContactLaw {
-                    feature: obstacle.shape.feature(&at),
-                    stiffness: obstacle.stiffness * stiffness(particle),
-                    friction: obstacle.friction,
-                    elastic_slip: ELASTIC_SLIP * spacing,
-                    anchor: obstacle.anchors.get(number).copied().unwrap_or(at),
-                    mean,
-                };
-                let touching = Touching::Obstacle(index);
-                found.push(ContactPoint { touching, number, area, carriers: vec![carrier], pose: *pose, law, y });
-            }
-        }
+    ends: &StepEnds<'_, D>,
+    (number, x): (usize, &Vector<T, D>),
+    (index, pose): (usize, &Pose<D, T>),
+) -> Option<ContactPoint<T, D>> {
+    let (SurfacePoint { particle, area, .. }, obstacle) = (points[number], &obstacles[index]);
+    let y = pose.to_frame(x);
+    let at = y.map(T::value);
+    let distance = |y: &Vector<f64, D>| obstacle.shape.signed_distance(y);
+    let mean = ends.as_ref().map(|([first, last], start)| {
+        // x_{n+1} = 2 x − x_n
+        let (x_n, last) = (&start[particle], last[index]);
+        let map = last.rotation.tr_mul(&pose.rotation.map(T::value)) * 2.0;
+        let shift = last.rotation.tr_mul(&(pose.shift.map(T::value) * 2.0 - x_n - last.shift));
+        let feature = obstacle.shape.feature(&(map * at + shift));
+        Ends { gap: distance(&first[index].to_frame(x_n)), feature, map, shift }
+    });
+    let deepest = mean.as_ref().map_or(f64::INFINITY, |mean| mean.gap.min(distance(&(mean.map * at + mean.shift))));
+    // NaN touches nothing.
+    let here = distance(&at);
+    if here.is_nan() || here.min(deepest) >= 0.0 {
+        return None;
     }
-    found
+    let law = ContactLaw {
+        feature: obstacle.shape.feature(&at),
+        stiffness: obstacle.stiffness * stiffness(particle),
+        friction: obstacle.friction,
+        elastic_slip: ELASTIC_SLIP * spacing,
+        anchor: obstacle.anchors.get(number).copied().unwrap_or(at),
+        mean,
+    };
+    let carriers = vec![Carrier::at(particle)];
+    Some(ContactPoint { touching: Touching::Obstacle(index), number, area, carriers, pose: *pose, law, y })
 }
 
 /// All points that touch another body.
@@ -223,7 +251,7 @@ fn pair_point<T: Real, const D: usize>(
         number: one.number,
         area: 0.5 * contacts.points[one.number].area,
         carriers,
-        pose: Pose { rotation: identity(), shift: Vector::zeros() },
+        pose: Pose { rotation: identity(), shift: Vector::zeros() }.lit(),
         law,
         y,
     })
@@ -265,11 +293,24 @@ impl<const D: usize> Facing<D> {
     }
 }
 
-impl<const D: usize> ContactPoint<f64, D> {
+impl<T: Real, const D: usize> ContactPoint<T, D> {
     /// The force on the body of the point.
-    pub fn force(&self) -> Vector<f64, D> {
+    pub fn force(&self) -> Vector<T, D> {
         let traction = self.law.traction(Response::Pressure, &self.y) + self.law.traction(Response::Friction, &self.y);
-        self.pose.rotation * traction * self.area
+        self.pose.rotation * traction * T::lit(self.area)
+    }
+
+    /// A part of this force.
+    pub fn force_of(&self, response: Response) -> Vector<T, D> {
+        self.pose.rotation * self.law.traction(response, &self.y) * T::lit(self.area)
+    }
+}
+
+impl<const D: usize> ContactPoint<f64, D> {
+    /// −∂f/∂x of a part of the force, at a fixed pose.
+    pub fn stiffness_of(&self, response: Response) -> Tensor<f64, D> {
+        let Pose { rotation, .. } = self.pose;
+        rotation * self.law.tangent(response, &self.y) * rotation.transpose() * self.area
     }
 }
 

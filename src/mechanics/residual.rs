@@ -25,6 +25,9 @@ pub(crate) fn unsymmetric<const D: usize, L: Law>(bodies: &[Body<L>], loads: &Lo
     if loads.contacts.have_friction() {
         return Some("friction makes the tangent unsymmetric");
     }
+    if loads.contacts.has_free_obstacle() {
+        return Some("an obstacle that moves freely makes the tangent unsymmetric");
+    }
     let law = bodies.iter().any(|body| !body.law.is_symmetric());
     law.then_some("a law makes the tangent unsymmetric")
 }

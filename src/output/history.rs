@@ -5,8 +5,9 @@ use super::csv::{Row, cell, text};
 use super::fields::padded;
 use crate::approximation::ShapeFunction;
 use crate::material::{DISSIPATED, Law, PLASTIC_STRAIN};
-use crate::mechanics::loads::{Loads, Reaction};
+use crate::mechanics::loads::{Loads, Reaction, RigidBody};
 use crate::simulation::{ContactForces, Simulation};
+use nalgebra::Rotation3;
 
 /// Axis names at the ends of column names.
 pub(crate) const AXES: [&str; 3] = ["x", "y", "z"];
@@ -138,8 +139,33 @@ pub(crate) fn obstacles<const D: usize>(time: f64, loads: &Loads<D>, contacts: &
         if obstacle.friction > 0.0 {
             row.push((format!("{}_friction_loss", obstacle.name), cell(contact.friction_loss)));
         }
+        if let Some(body) = &obstacle.free {
+            add_free(&mut row, &obstacle.name, body);
+        }
     }
     row
+}
+
+/// Adds the centre of mass of a free obstacle, its rotation vector (axis times angle), its velocity, its angular velocity, and its kinetic
+/// energy.
+fn add_free<const D: usize>(row: &mut Row, name: &str, body: &RigidBody<D>) {
+    let mut add = |what: &str, x: f64| row.push((format!("{name}_{what}"), cell(x)));
+    let turned = Rotation3::from_matrix_unchecked(body.rotation).scaled_axis();
+    let (velocity, spin) = (&body.velocity, body.spin());
+    AXES.iter().zip(&body.position).for_each(|(axis, x)| add(&format!("position_{axis}"), *x));
+    AXES.iter().zip(velocity.iter().take(D)).for_each(|(axis, v)| add(&format!("velocity_{axis}"), *v));
+    match D {
+        1 => {}
+        2 => {
+            add("angle", turned[2]);
+            add("spin", spin[2]);
+        }
+        _ => {
+            AXES.iter().zip(&turned).for_each(|(axis, x)| add(&format!("angle_{axis}"), *x));
+            AXES.iter().zip(&spin).for_each(|(axis, x)| add(&format!("spin_{axis}"), *x));
+        }
+    }
+    add("kinetic", body.kinetic_energy());
 }
 
 /// The row of a pair of bodies in `contacts.csv`, for a step that ended at `time`: the force and the moment on the second body, the area, the

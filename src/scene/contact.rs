@@ -2,6 +2,8 @@
 
 use super::Scene;
 use super::obstacle::{check_law, default_stiffness, too_stiff};
+use super::time::word;
+use crate::mechanics::schemes::Parameters;
 use crate::problems::Problems;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -80,6 +82,22 @@ impl Scene {
         self.bodies.iter().map(|body| body.name.as_str()).collect()
     }
 
+    /// Refuses an obstacle that moves freely where its motion has no meaning.
+    fn refuse_free(&self, problems: &mut Problems, path: &str) {
+        let scheme = self.time.scheme();
+        let word = word(scheme);
+        let statics = format!("time.scheme is {word}, and without inertia nothing moves freely: remove one of the two");
+        let mean = format!("time.scheme is {word}, which has no free obstacles: remove one of the two");
+        if scheme == Parameters::EnergyMomentum {
+            problems.refuse(path, "a free obstacle", mean);
+        } else if !scheme.has_inertia() {
+            problems.refuse(path, "a free obstacle", statics);
+        }
+        let varies = self.gravity.as_ref().is_some_and(|gravity| gravity.profile.is_some());
+        let allowed = "gravity.profile varies gravity over particles, and an obstacle has none: remove one of the two";
+        problems.require(!varies, path, "a free obstacle", allowed);
+    }
+
     /// Checks obstacles, and contact between bodies.
     pub(super) fn check_contacts(&self, problems: &mut Problems, dimension: usize) {
         for (i, obstacle) in problems.few("obstacles", &self.obstacles).iter().enumerate() {
@@ -88,6 +106,9 @@ impl Scene {
             let again = self.obstacles.iter().take(i).any(|earlier| earlier.name == obstacle.name);
             let allowed = "must differ from the names of the obstacles before";
             problems.require(!again, &format!("{path}.name"), format_args!("{:?}", obstacle.name), allowed);
+            if obstacle.free.is_some() {
+                self.refuse_free(problems, &format!("{path}.free"));
+            }
         }
         let from_files = self.bodies.iter().enumerate().filter(|(_, body)| body.particles.is_some());
         for (i, _) in from_files.filter(|_| self.has_contact()) {

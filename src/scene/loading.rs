@@ -73,19 +73,22 @@ impl<const D: usize> Builder<'_, D> {
             };
             loads.surface.push(SurfaceLoad { pressing, curve: factor(load.curve.as_ref())?, points });
         }
-        loads.contacts = self.contacts()?;
+        let gravity = loads.gravity.as_ref().map_or_else(Vector::zeros, |gravity| gravity.at(0.0));
+        loads.contacts = self.contacts(&gravity)?;
         Ok(loads)
     }
 
     /// The contacts, and points on the whole surface of every body, if there are contacts. Where bodies of one nodal field are joined, there is no
     /// surface.
-    fn contacts(&mut self) -> Result<Contacts<D>, BuildError> {
+    fn contacts(&mut self, gravity: &Vector<f64, D>) -> Result<Contacts<D>, BuildError> {
         let scene = self.scene;
         let mut contacts = Contacts::default();
         for (i, one) in scene.obstacles.iter().enumerate() {
             let path = format!("obstacles[{i}]");
             let (shape, motion) = (one.shape.built(&path)?, one.motion().motion(0)?);
-            contacts.obstacles.push(Obstacle::new(one.name.clone(), shape, motion, one.stiffness, one.friction));
+            let free = one.free.as_ref().map(|free| free.build(&path, &shape, gravity)).transpose()?;
+            let obstacle = Obstacle::new(one.name.clone(), shape, motion, one.stiffness, one.friction);
+            contacts.obstacles.push(Obstacle { free, ..obstacle });
         }
         if let Some(contact) = &scene.contact {
             let fields = scene.nodal_fields();
@@ -129,7 +132,7 @@ impl<const D: usize> Builder<'_, D> {
         bodies.filter(is_around).map(|body| body.name.as_str()).next()
     }
 
-    /// Refuses bodies that start in an obstacle.
+    /// Refuses bodies that start in an obstacle, and free obstacles that start in another obstacle.
     pub fn refuse_overlap(&self, Contacts { obstacles, .. }: &Contacts<D>) -> Result<(), BuildError> {
         let (particles, h) = (&self.particles, self.grid.spacing);
         for (i, obstacle) in obstacles.iter().enumerate() {
@@ -144,6 +147,18 @@ impl<const D: usize> Builder<'_, D> {
                     obstacle.name
                 );
                 return Err(BuildError::at(format!("obstacles[{i}]"), what));
+            }
+            for other in obstacles.iter().filter(|other| other.name != obstacle.name) {
+                let surface = obstacle.free.iter().flat_map(|body| &body.surface);
+                if let Some(x) = surface.into_iter().find(|x| other.shape.signed_distance(x) < 0.0) {
+                    let what = format!(
+                        "the free obstacle {:?} starts in the obstacle {:?} at {:?}; move one of the two",
+                        obstacle.name,
+                        other.name,
+                        x.as_slice()
+                    );
+                    return Err(BuildError::at(format!("obstacles[{i}].free"), what));
+                }
             }
             if let Some(body) = self.around(&obstacle.shape) {
                 let what = format!("obstacle {:?} starts inside body {body:?}; move one of the two", obstacle.name);

@@ -9,6 +9,7 @@ pub mod body;
 pub mod boundary;
 pub mod contact;
 pub mod curve;
+mod free;
 pub mod grid;
 pub mod image_file;
 pub mod keys;

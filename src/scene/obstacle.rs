@@ -1,13 +1,14 @@
 //! Rigid obstacles.
 
 use super::boundary::{Face, Rotation, Table};
+use super::free::Free;
 use super::shape::Shape;
 use crate::problems::Problems;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A rigid obstacle. The surfaces of all bodies touch the obstacle without adhesion, with a one-sided penalty and Coulomb friction. The
-/// obstacle rests, or has the motion given by one of `displacement`, `velocity` and `rotation`. Force, moment, area, work and friction loss of every step are in
+/// obstacle rests, has the motion given by one of `displacement`, `velocity` and `rotation`, or moves freely with the key `free`. Force, moment, area, work and friction loss of every step are in
 /// `obstacles.csv`.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -31,6 +32,8 @@ pub struct Obstacle {
     pub velocity: Option<Table>,
     /// A rotation about a fixed axis.
     pub rotation: Option<Rotation>,
+    /// Mass, for an obstacle that contact and gravity move.
+    pub free: Option<Free>,
 }
 
 /// The stiffness of contact that delays a rebound by a few percent of the time of contact, and needs few Newton iterations.
@@ -88,11 +91,17 @@ impl Obstacle {
             let empty = min.iter().zip(&max).any(|(min, max)| max < min);
             let allowed = "must hold something: its parts do not meet";
             problems.require(!empty, &format!("{path}.shape"), "an empty shape", allowed);
+            let bounded = min.iter().chain(&max).all(|x| x.is_finite());
+            let allowed = "must be bounded: an obstacle that moves freely has a mass";
+            problems.require(bounded || self.free.is_none(), &format!("{path}.shape"), "an unbounded shape", allowed);
         }
         check_law(problems, path, self.friction, self.stiffness, dimension);
         let given = self.given();
         given.iter().for_each(|(_, motion)| motion.check(problems, path, dimension));
-        let keys: Vec<_> = given.iter().map(|(key, _)| *key).collect();
+        if let Some(free) = &self.free {
+            free.check(problems, &format!("{path}.free"), dimension);
+        }
+        let keys: Vec<_> = given.iter().map(|(key, _)| *key).chain(self.free.iter().map(|_| "free")).collect();
         problems.require(keys.len() < 2, path, keys.join(" and "), "give one of them");
     }
 }

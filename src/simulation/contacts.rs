@@ -6,7 +6,8 @@ use crate::approximation::ShapeFunction;
 use crate::material::Law;
 use crate::mechanics::contact::{Carrier, ContactPoint, Response, Surroundings, Touching, obstacle_points};
 use crate::mechanics::facing::{DEEPEST, Overlap, REACH, facing, overlaps};
-use crate::mechanics::loads::{Contacts, Facing, Obstacle, Pose};
+use crate::mechanics::free_obstacle::FreeMotion;
+use crate::mechanics::loads::{Contacts, Facing, Obstacle, Pose, RigidBody};
 use crate::mechanics::schemes::Alphas;
 use crate::mechanics::terms::{ContactForce, Step, penalties};
 use crate::shape::Shape;
@@ -50,6 +51,8 @@ pub(super) struct ContactUpdate<const D: usize> {
     slips: Vec<Vector<f64, D>>,
     /// The energy stored in the contact between bodies.
     energy: f64,
+    /// The new state of every obstacle that moves freely.
+    free: Vec<Option<RigidBody<D>>>,
     /// The work of all obstacles in the step.
     pub work: f64,
     /// The friction loss of all contacts in the step.
@@ -79,7 +82,8 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// The contact at the end of a step, with the nodal motion `phi` since the last grid reset.
     ///
     /// # Errors
-    /// A point enters an obstacle or another body too deeply, or goes through it.
+    /// A point enters an obstacle or another body too deeply, or goes through it. A free obstacle meets another obstacle, or has no balance of
+    /// forces.
     pub(super) fn contact_update(
         &self,
         step: &Step<'_, D, L>,
@@ -92,29 +96,75 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         // Forces at both ends are those of an instant.
         let alphas = Alphas { discrete_gradient: false, ..step.alphas };
         let end = Step { time: self.load() + self.clock.step(), alphas, ..*step };
+        let before: Vec<_> = step.nodal.moved(step.supports.nodes()).collect();
+        let free = self.free_after(step, &before, phi)?;
+        let after = |(pose, body): (Pose<D>, &Option<RigidBody<D>>)| {
+            body.as_ref().map_or(pose, |body| body.pose(&Vector::zeros()))
+        };
         let motion = Motion {
-            poses: [self.poses(self.load()), self.poses(end.time)],
+            poses: [self.poses(self.load()), self.poses(end.time).into_iter().zip(&free).map(after).collect()],
             positions: self.point_positions(step, phi),
             relative: self.relative_motions(step, phi),
         };
         self.check_entry(&motion.poses, &motion.positions)?;
         self.check_overlap(&motion)?;
-        let mut update = self.untouched(&motion);
-        let at_end = points_at(&end, phi);
+        self.check_meeting(&motion.poses[1])?;
+        let mut update = ContactUpdate { free, ..self.untouched(&motion) };
+        let at_end = points_at(&end, phi, &motion.poses[1]);
         at_end.iter().for_each(|one| update.add_end(one, contacts, &motion));
         let mut work = |share, points: &[ContactPoint<f64, D>]| {
             points.iter().for_each(|one| update.add_work(share, one, &motion, &self.ends(one, &motion.positions)));
         };
-        let before: Vec<_> = step.nodal.moved(step.supports.nodes()).collect();
         if step.alphas.discrete_gradient {
-            work(1.0, &points_at(step, &halfway(&before, phi)));
+            work(1.0, &points_at(step, &halfway(&before, phi), &self.poses(step.time)));
             return Ok(update);
         }
         work(0.5, &at_end);
         let start = Step { time: self.load(), ..end };
         mutant!("obstacles: the forces at the start of a step do no work": { return Ok(update); });
-        work(0.5, &points_at(&start, &before));
+        work(0.5, &points_at(&start, &before, &motion.poses[0]));
         Ok(update)
+    }
+
+    /// The free obstacles at the end of a step, whose nodes move from `before` to `phi`. Forces are in balance at a part θ of the step.
+    fn free_after(
+        &self,
+        step: &Step<'_, D, L>,
+        before: &[Vector<f64, D>],
+        phi: &[Vector<f64, D>],
+    ) -> Result<Vec<Option<RigidBody<D>>>, StepError> {
+        let (contacts, scheme) = (&self.loads.contacts, &self.settings.scheme);
+        let force = ContactForce::pressure(step).filter(|_| contacts.has_free_obstacle());
+        let Some(force) = force else { return Ok(contacts.obstacles.iter().map(|_| None).collect()) };
+        let (theta, end) = (scheme.instant(), scheme.end(self.clock.step()));
+        let balanced: Vec<_> = before.iter().zip(phi).map(|(before, phi)| before + (phi - before) * theta).collect();
+        let after = |(obstacle, motion): (&Obstacle<D>, Option<FreeMotion>)| {
+            let (Some(body), Some(motion)) = (&obstacle.free, motion) else { return Ok(None) };
+            // Newton's method of the bodies has used forces that are wrong if they are not in balance on the obstacle.
+            let refused = StepError::FreeObstacle { obstacle: obstacle.name.clone() };
+            let q = motion.q / theta;
+            mutant!("free obstacles: they stay where forces are in balance": q = motion.q);
+            if motion.is_balanced { Ok(Some(body.after(&q, &end))) } else { Err(refused) }
+        };
+        contacts.obstacles.iter().zip(force.free_motions(&balanced)).map(after).collect()
+    }
+
+    /// Refuses a free obstacle in another obstacle: obstacles do not push each other.
+    fn check_meeting(&self, poses: &[Pose<D>]) -> Result<(), StepError> {
+        let obstacles = &self.loads.contacts.obstacles;
+        for (number, one) in obstacles.iter().enumerate() {
+            let surface = one.free.iter().flat_map(|body| &body.surface).map(|point| poses[number].to_space(point));
+            for x in surface {
+                let mut others = obstacles.iter().zip(poses).enumerate().filter(|(other, _)| *other != number);
+                if let Some((_, (other, _))) =
+                    others.find(|(_, (other, pose))| other.shape.signed_distance(&pose.to_frame(&x)) < 0.0)
+                {
+                    let names = [one.name.clone(), other.name.clone()];
+                    return Err(StepError::ObstaclesMeet { names, position: x.iter().copied().collect() });
+                }
+            }
+        }
+        Ok(())
     }
 
     /// The update of a step in which nothing touches.
@@ -248,6 +298,8 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             obstacle.anchors.clone_from(anchors);
             (obstacle.work, obstacle.friction_loss) = (contact.work, contact.friction_loss);
         }
+        let free = self.loads.contacts.obstacles.iter_mut().zip(&update.free);
+        free.for_each(|(obstacle, body)| obstacle.free.clone_from(body));
         if let Some(between) = &mut self.loads.contacts.between {
             between.slips.clone_from(&update.slips);
             between.energy = update.energy;
@@ -266,7 +318,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             stiffness: |p: usize| penalties[particles.body[p] as usize],
             position: |carrier: &Carrier<D>| particles.position[carrier.particle],
         };
-        let touching = obstacle_points(&self.loads.contacts, &around);
+        let touching = obstacle_points(&self.loads.contacts, &around, &self.poses(self.load()));
         let between = self.loads.contacts.between.as_ref().map_or(0.0, |between| between.energy);
         touching.iter().fold(between, |sum, one| sum + one.law.energy(&one.y) * one.area)
     }
@@ -352,9 +404,13 @@ impl<const D: usize> ContactUpdate<D> {
     }
 }
 
-/// All points in contact at the time of `step`, with the nodal motion `phi` since the last grid reset.
-fn points_at<const D: usize, L: Law>(step: &Step<'_, D, L>, phi: &[Vector<f64, D>]) -> Vec<ContactPoint<f64, D>> {
-    ContactForce::pressure(step).map_or_else(Vec::new, |force| force.contact_points(phi))
+/// All points in contact at the time of `step`, with the nodal motion `phi` since the last grid reset and the poses of all obstacles.
+fn points_at<const D: usize, L: Law>(
+    step: &Step<'_, D, L>,
+    phi: &[Vector<f64, D>],
+    poses: &[Pose<D>],
+) -> Vec<ContactPoint<f64, D>> {
+    ContactForce::pressure(step).map_or_else(Vec::new, |force| force.contact_points_at(phi, poses))
 }
 
 /// The depth, in spacings, of a point that enters an obstacle too deeply or goes through it; `None` for an allowed motion. The point moves

@@ -185,6 +185,25 @@ pub enum StepError {
         /// Depth at the end of the step, in grid spacings.
         depth: f64,
     },
+    /// The balance of forces of a free obstacle has no solution that Newton's method finds.
+    #[error(
+        "the forces on the free obstacle {obstacle:?} are not in balance: take shorter steps, or a softer contact (obstacles[].stiffness)"
+    )]
+    FreeObstacle {
+        /// Name of the obstacle.
+        obstacle: String,
+    },
+    /// A free obstacle meets another obstacle.
+    #[error(
+        "the free obstacle {:?} meets the obstacle {:?} at {position:?}, and obstacles do not push each other: make one of the two a body",
+        names[0], names[1]
+    )]
+    ObstaclesMeet {
+        /// Names of the obstacles.
+        names: [String; 2],
+        /// The place.
+        position: Vec<f64>,
+    },
     /// Two bodies move so fast that contact may be missed.
     #[error(
         "bodies {:?} and {:?} are near each other, and points of them move by more than {reach} grid spacings relative to each other in one \

@@ -195,6 +195,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
                 | StepError::Unbalanced { .. }
                 | StepError::EntersObstacle { .. }
                 | StepError::EntersBody { .. }
+                | StepError::FreeObstacle { .. }
                 | StepError::PassesBody { .. }
                 | StepError::Inaccurate { .. } => true,
                 // The step may be too long to meet a wall, an obstacle or another body.

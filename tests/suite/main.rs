@@ -15,6 +15,7 @@ mod equilibrium;
 mod examples;
 mod flow;
 mod foreign;
+mod free_obstacles;
 mod hostile;
 mod images;
 mod incompressible;

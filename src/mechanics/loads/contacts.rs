@@ -75,6 +75,11 @@ impl<const D: usize> Contacts<D> {
         !self.obstacles.is_empty() || self.between.is_some()
     }
 
+    /// Whether an obstacle moves freely.
+    pub fn has_free_obstacle(&self) -> bool {
+        self.obstacles.iter().any(|obstacle| obstacle.free.is_some())
+    }
+
     /// Whether friction acts anywhere.
     pub fn have_friction(&self) -> bool {
         let between = self.between.iter().map(|between| between.friction);

@@ -8,6 +8,7 @@ mod motion_step;
 mod obstacle;
 mod prescribed;
 mod rayleigh;
+pub(crate) mod rigid_body;
 mod rotation;
 
 pub(crate) use at_surface::at_surface_points;
@@ -18,6 +19,7 @@ pub use motion_step::MotionStep;
 pub use obstacle::{Obstacle, Pose};
 pub use prescribed::{Motion, Prescribed, PrescribedDof, Reaction, Selection, prescribed_dofs};
 pub use rayleigh::Rayleigh;
+pub use rigid_body::RigidBody;
 pub use rotation::Rotation;
 
 use crate::tensor::Vector;
@@ -30,6 +32,13 @@ pub struct Gravity<const D: usize> {
     pub acceleration: Vector<f64, D>,
     /// The factor in time.
     pub curve: Curve,
+}
+
+impl<const D: usize> Gravity<D> {
+    /// b(t)
+    pub fn at(&self, t: f64) -> Vector<f64, D> {
+        self.acceleration * self.curve.value(t)
+    }
 }
 
 /// A particle that represents a piece of surface: a surface point without volume, or a particle of the body.

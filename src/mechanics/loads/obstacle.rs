@@ -1,6 +1,8 @@
 //! Rigid obstacles that bodies touch: their shape, their motion, and the state of their friction.
 
+use super::RigidBody;
 use super::prescribed::Motion;
+use crate::scalar::Real;
 use crate::shape::Shape;
 use crate::tensor::{Tensor, Vector, identity};
 
@@ -13,6 +15,8 @@ pub struct Obstacle<const D: usize> {
     pub shape: Shape<D>,
     /// The motion of each component; a component without motion rests.
     pub motion: [Option<Motion<D>>; D],
+    /// The mass and the state of an obstacle that moves freely; `None` if its motion is prescribed.
+    pub free: Option<RigidBody<D>>,
     /// The penalty stiffness (pressure per depth) in units of min(Λ + 2G, 4G)/h of the body, > 0.
     pub stiffness: f64,
     /// The coefficient of friction μ, ≥ 0.
@@ -28,15 +32,15 @@ pub struct Obstacle<const D: usize> {
 
 /// The rigid motion x = b + R X of an obstacle since t = 0. X is a position in the frame of the obstacle.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pose<const D: usize> {
+pub struct Pose<const D: usize, T = f64> {
     /// R
-    pub rotation: Tensor<f64, D>,
+    pub rotation: Tensor<T, D>,
     /// b
-    pub shift: Vector<f64, D>,
+    pub shift: Vector<T, D>,
 }
 
 impl<const D: usize> Obstacle<D> {
-    /// The rigid motion up to time `t`.
+    /// The rigid motion up to time `t`. A free obstacle has its pose at t_n.
     ///
     /// ```
     /// use bfree::mechanics::loads::{Curve, Motion, Obstacle, Rotation};
@@ -57,6 +61,9 @@ impl<const D: usize> Obstacle<D> {
             let of = |i: usize| self.motion[i].as_ref().map_or(0.0, |motion| motion.over(0.0, t, x, i).increment);
             Vector::<f64, D>::from_fn(|i, _| of(i))
         };
+        if let Some(body) = &self.free {
+            return body.pose(&Vector::zeros());
+        }
         mutant!("obstacle: it rests": { return Pose { rotation: identity(), shift: Vector::zeros() }; });
         let shift = moved(&Vector::zeros());
         let mut rotation = identity::<f64, D>();
@@ -76,23 +83,31 @@ impl<const D: usize> Obstacle<D> {
         friction: f64,
     ) -> Self {
         let name = name.into();
-        Self { name, shape, motion, stiffness, friction, anchors: Vec::new(), work: 0.0, friction_loss: 0.0 }
+        let free = None;
+        Self { name, shape, motion, free, stiffness, friction, anchors: Vec::new(), work: 0.0, friction_loss: 0.0 }
     }
 
     /// Whether the obstacle moves at any time.
     pub fn moves(&self) -> bool {
-        self.motion.iter().flatten().any(|motion| *motion != Motion::Rest)
+        self.free.is_some() || self.motion.iter().flatten().any(|motion| *motion != Motion::Rest)
     }
 }
 
 impl<const D: usize> Pose<D> {
+    /// The pose as constants of another number type.
+    pub(crate) fn lit<T: Real>(&self) -> Pose<D, T> {
+        Pose { rotation: self.rotation.map(T::lit), shift: self.shift.map(T::lit) }
+    }
+}
+
+impl<T: Real, const D: usize> Pose<D, T> {
     /// X = Rᵀ (x − b), a position in the frame of the obstacle.
-    pub fn to_frame(&self, x: &Vector<f64, D>) -> Vector<f64, D> {
+    pub fn to_frame(&self, x: &Vector<T, D>) -> Vector<T, D> {
         self.rotation.tr_mul(&(x - self.shift))
     }
 
     /// x = b + R X
-    pub fn to_space(&self, x: &Vector<f64, D>) -> Vector<f64, D> {
+    pub fn to_space(&self, x: &Vector<T, D>) -> Vector<T, D> {
         self.shift + self.rotation * x
     }
 }

@@ -4,8 +4,11 @@
 use super::term::{FunctionsAt, Linearized, LinearizedTerm, Step, Sum, Term, summed};
 use crate::material::{Law, p_wave_modulus, poissons_ratio};
 use crate::mechanics::constitutive::{Inadmissible, Part};
-use crate::mechanics::contact::{Carrier, ContactPoint, Response, Surroundings, obstacle_points, pair_points};
-use crate::mechanics::loads::Pose;
+use crate::mechanics::contact::{
+    Carrier, ContactPoint, Response, Surroundings, Touching, obstacle_points, pair_points, points_on,
+};
+use crate::mechanics::free_obstacle::{FreeBalance, FreeMotion, FreePoint};
+use crate::mechanics::loads::{Pose, RigidBody};
 use crate::mechanics::sweep::{Number, Supports};
 use crate::mechanics::trial::Trial;
 use crate::particles::Body;
@@ -34,19 +37,69 @@ impl<'a, const D: usize, L: Law> ContactForce<'a, D, L> {
     }
 
     /// All points in contact at Δφ.
-    pub(crate) fn contact_points<T: Number>(&self, dphi: &[Vector<T, D>]) -> Vec<ContactPoint<T, D>> {
-        let Step { particles, supports, loads, time, alphas, .. } = self.step;
+    fn contact_points<T: Number>(&self, dphi: &[Vector<T, D>]) -> Vec<ContactPoint<T, D>> {
+        self.contact_points_at(dphi, &self.poses(dphi))
+    }
+
+    /// All points in contact at Δφ and at these poses of all obstacles.
+    pub(crate) fn contact_points_at<T: Number>(
+        &self,
+        dphi: &[Vector<T, D>],
+        poses: &[Pose<D, T>],
+    ) -> Vec<ContactPoint<T, D>> {
+        let (contacts, around) = (&self.step.loads.contacts, self.around(dphi));
+        let mut found = obstacle_points(contacts, &around, poses);
+        found.extend(pair_points(contacts, &around));
+        found
+    }
+
+    /// The surroundings of the contacts at Δφ.
+    fn around<'x, T: Number>(
+        &'x self,
+        dphi: &'x [Vector<T, D>],
+    ) -> Surroundings<'x, impl Fn(usize) -> f64, impl Fn(&Carrier<D>) -> Vector<T, D>, D> {
+        let Step { particles, supports, time, alphas, .. } = self.step;
         let reference = particles.reference().position;
-        let around = Surroundings {
+        Surroundings {
             t: time,
             start: alphas.discrete_gradient.then_some((time - alphas.dt, &*particles.position)),
             spacing: supports.grid().spacing,
             stiffness: |p: usize| self.stiffness[particles.body[p] as usize],
-            position: |carrier: &Carrier<D>| carrier.position(reference, supports, dphi),
+            position: move |carrier: &Carrier<D>| carrier.position(reference, supports, dphi),
+        }
+    }
+
+    /// The poses of all obstacles at Δφ.
+    fn poses<T: Number>(&self, dphi: &[Vector<T, D>]) -> Vec<Pose<D, T>> {
+        let (contacts, around) = (&self.step.loads.contacts, self.around(dphi));
+        let pose = |(index, motion): (usize, Option<FreeMotion>)| {
+            let obstacle = &contacts.obstacles[index];
+            let (Some(motion), Some(body)) = (motion, &obstacle.free) else {
+                return obstacle.pose(self.step.time).lit();
+            };
+            let points_at = |q: &Vector<T, 6>| points_on(contacts, &around, index, &body.pose(q));
+            let q = self.free_balance(body).implicit(motion, points_at);
+            body.pose(&q)
         };
-        let mut found = obstacle_points(&loads.contacts, &around);
-        found.extend(pair_points(&loads.contacts, &around));
-        found
+        let values: Vec<Vector<f64, D>> = dphi.iter().map(|x| x.map(T::value)).collect();
+        self.free_motions(&values).into_iter().enumerate().map(pose).collect()
+    }
+
+    /// The motion of every obstacle that moves freely, at Δφ.
+    pub(crate) fn free_motions(&self, dphi: &[Vector<f64, D>]) -> Vec<Option<FreeMotion>> {
+        let (contacts, around) = (&self.step.loads.contacts, self.around(dphi));
+        let motion = |(index, body): (usize, &RigidBody<D>)| {
+            let points_at = |q: &Vector<f64, 6>| points_on(contacts, &around, index, &body.pose(q));
+            self.free_balance(body).solve(points_at)
+        };
+        let all = contacts.obstacles.iter().enumerate();
+        all.map(|(index, obstacle)| obstacle.free.as_ref().map(|body| motion((index, body)))).collect()
+    }
+
+    fn free_balance<'x>(&self, body: &'x RigidBody<D>) -> FreeBalance<'x, D> {
+        let Step { alphas, loads, time, supports, .. } = self.step;
+        let gravity = loads.gravity.as_ref().map_or_else(Vector::zeros, |gravity| gravity.at(time));
+        FreeBalance { body, alphas, gravity, spacing: supports.grid().spacing }
     }
 }
 
@@ -73,10 +126,10 @@ impl<const D: usize, L: Law> Term<D> for ContactForce<'_, D, L> {
     }
 
     fn add_at_nodes<T: Number>(&self, dphi: &[Vector<T, D>], out: &mut [Vector<T, D>]) {
-        for ContactPoint { area, pose, law, y, carriers, .. } in self.contact_points(dphi) {
-            let force = pose.rotation.map(T::lit) * law.traction(self.response, &y) * T::lit(area);
-            mutant!("contact: the force does not turn with the obstacle": force = law.traction(self.response, &y) * T::lit(area));
-            for carrier in &carriers {
+        for one in self.contact_points(dphi) {
+            let force = one.force_of(self.response);
+            mutant!("contact: the force does not turn with the obstacle": force = one.law.traction(self.response, &one.y) * T::lit(one.area));
+            for carrier in &one.carriers {
                 carrier
                     .weights(self.step.supports)
                     .for_each(|(node, n)| out[node] -= force * T::lit(carrier.share * n));
@@ -84,16 +137,17 @@ impl<const D: usize, L: Law> Term<D> for ContactForce<'_, D, L> {
         }
     }
 
-    /// Σ ½ k g² A
+    /// Σ ½ k g² A. Free obstacles have inertia, and a potential only in the plane.
     fn energy<T: Number>(&self, dphi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>> {
         let energy = |one: ContactPoint<T, D>| one.law.energy(&one.y) * T::lit(one.area);
-        (self.response == Response::Pressure).then(|| Ok(summed(self.contact_points(dphi).into_iter().map(energy))))
+        let has_potential = self.response == Response::Pressure && !self.step.loads.contacts.has_free_obstacle();
+        has_potential.then(|| Ok(summed(self.contact_points(dphi).into_iter().map(energy))))
     }
 
     fn add_magnitudes_at_nodes(&self, dphi: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
-        for ContactPoint { area, pose, law, y, carriers, .. } in self.contact_points(dphi) {
-            let force = pose.rotation * law.traction(self.response, &y) * area;
-            for carrier in &carriers {
+        for one in self.contact_points(dphi) {
+            let force = one.force_of(self.response);
+            for carrier in &one.carriers {
                 let share = carrier.share.abs();
                 carrier.weights(self.step.supports).for_each(|(node, n)| out[node] += force.abs() * (share * n.abs()));
             }
@@ -103,7 +157,7 @@ impl<const D: usize, L: Law> Term<D> for ContactForce<'_, D, L> {
     /// The gap changes by the rounding of positions.
     fn add_sensitivity(&self, dphi: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) -> Result<(), Inadmissible> {
         let (supports, reference) = (self.step.supports, self.step.particles.reference().position);
-        for LinearizedPoint { carriers, tangent } in self.linearized(dphi) {
+        for LinearizedPoint { carriers, tangent, .. } in self.linearized(dphi) {
             for Carrier { particle, share, .. } in &carriers {
                 let x = reference[*particle].abs() + supports.value_at(*particle, dphi).abs();
                 let change = tangent.abs() * x * share.powi(2);
@@ -114,21 +168,29 @@ impl<const D: usize, L: Law> Term<D> for ContactForce<'_, D, L> {
     }
 
     fn linearize(&self, Trial { dphi, .. }: Trial<'_, f64, D>, _: Part) -> LinearizedTerm<'_, D> {
-        Ok(vec![Box::new(LinearizedContact::new(self.linearized(dphi), self.step.supports))])
+        let Step { loads, supports, .. } = self.step;
+        let obstacles = loads.contacts.obstacles.len();
+        Ok(vec![Box::new(LinearizedContact::new(self.linearized(dphi), obstacles, supports))])
     }
 }
 
 impl<const D: usize, L: Law> ContactForce<'_, D, L> {
     fn linearized(&self, dphi: &[Vector<f64, D>]) -> Vec<LinearizedPoint<D>> {
-        let linearize = |ContactPoint { area, pose: Pose { rotation, .. }, law, y, carriers, .. }: ContactPoint<
-            f64,
-            D,
-        >| {
-            let tangent = rotation * law.tangent(self.response, &y) * rotation.transpose() * area;
-            mutant!("contact: the tangent does not turn with the obstacle": tangent = law.tangent(self.response, &y) * area);
-            LinearizedPoint { carriers, tangent }
+        let contacts = &self.step.loads.contacts;
+        let (motions, points) = (self.free_motions(dphi), self.contact_points(dphi));
+        let on_free = |one: &ContactPoint<f64, D>| {
+            let Touching::Obstacle(index) = one.touching else { return None };
+            let balance = self.free_balance(contacts.obstacles[index].free.as_ref()?);
+            Some((index, balance.linearized(motions[index].as_ref()?, one, self.response)))
         };
-        self.contact_points(dphi).into_iter().map(linearize).collect()
+        let linearize = |one: &ContactPoint<f64, D>| {
+            let tangent = one.stiffness_of(self.response);
+            mutant!("contact: the tangent does not turn with the obstacle": tangent = one.law.tangent(self.response, &one.y) * one.area);
+            let on_free = on_free(one);
+            mutant!("free obstacles: the tangent holds them": on_free = None);
+            LinearizedPoint { carriers: one.carriers.clone(), tangent, on_free }
+        };
+        points.iter().map(linearize).collect()
     }
 }
 
@@ -136,35 +198,53 @@ struct LinearizedContact<const D: usize> {
     points: Vec<LinearizedPoint<D>>,
     /// For each point, the nodes that move it and their weights.
     weights: Vec<Vec<(usize, f64)>>,
+    /// The number of obstacles.
+    obstacles: usize,
 }
 
-/// −∂(t A)/∂x of a point in contact.
+/// A point in contact, linearised.
 struct LinearizedPoint<const D: usize> {
     carriers: Vec<Carrier<D>>,
+    /// −∂f/∂x of the force, at fixed poses of all obstacles.
     tangent: Tensor<f64, D>,
+    /// The number of the free obstacle that the point touches, and how both depend on each other.
+    on_free: Option<(usize, FreePoint<D>)>,
 }
 
 impl<const D: usize> LinearizedContact<D> {
-    fn new(points: Vec<LinearizedPoint<D>>, supports: &Supports<D>) -> Self {
+    fn new(points: Vec<LinearizedPoint<D>>, obstacles: usize, supports: &Supports<D>) -> Self {
         let of = |carrier: &Carrier<D>| {
             carrier.weights(supports).map(|(node, n)| (node, carrier.share * n)).collect::<Vec<_>>()
         };
         let weights = points.iter().map(|point| point.carriers.iter().flat_map(of).collect()).collect();
-        Self { points, weights }
+        Self { points, weights, obstacles }
     }
 }
 
 impl<const D: usize> Linearized<D> for LinearizedContact<D> {
     fn add_product_at_nodes(&self, u: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
-        for (LinearizedPoint { tangent, .. }, weights) in self.points.iter().zip(&self.weights) {
-            let force = tangent * weights.iter().fold(Vector::zeros(), |sum, &(node, n)| sum + u[node] * n);
+        let moved =
+            |weights: &[(usize, f64)]| weights.iter().fold(Vector::zeros(), |sum, &(node, n)| sum + u[node] * n);
+        // δq of the free obstacles
+        let mut motions = vec![Vector::<f64, 6>::zeros(); self.obstacles];
+        for (point, weights) in self.points.iter().zip(&self.weights) {
+            if let Some((obstacle, free)) = &point.on_free {
+                motions[*obstacle] += free.motion * moved(weights);
+            }
+        }
+        for (LinearizedPoint { tangent, on_free, .. }, weights) in self.points.iter().zip(&self.weights) {
+            let mut force = tangent * moved(weights);
+            if let Some((obstacle, free)) = on_free {
+                force -= free.of_motion * motions[*obstacle];
+            }
             weights.iter().for_each(|&(node, n)| out[node] += force * n);
         }
     }
 
-    /// W_I² K, with the sum W_I over all places that the node moves
+    /// W_I² K, with the sum W_I over all places that the node moves. A free obstacle subtracts (Σ W_I ∂f/∂q) (Σ ∂q/∂x W_I).
     fn add_blocks_of_functions(&self, functions: &FunctionsAt<'_, D>, blocks: &mut [Tensor<f64, D>]) {
-        for LinearizedPoint { carriers, tangent } in &self.points {
+        let mut through: BTreeMap<(usize, usize), FreePoint<D>> = BTreeMap::new();
+        for LinearizedPoint { carriers, tangent, on_free } in &self.points {
             let mut of_node: BTreeMap<usize, [f64; D]> = BTreeMap::new();
             for Carrier { particle, share, offset } in carriers {
                 for (node, function) in functions(*particle) {
@@ -174,7 +254,13 @@ impl<const D: usize> Linearized<D> for LinearizedContact<D> {
             }
             for (node, w) in of_node {
                 blocks[node] += Tensor::from_fn(|i, k| w[i] * tangent[(i, k)] * w[k]);
+                if let Some((obstacle, free)) = on_free {
+                    through.entry((*obstacle, node)).or_insert_with(FreePoint::zero).add(free, &w);
+                }
             }
+        }
+        for ((_, node), FreePoint { of_motion, motion }) in through {
+            blocks[node] -= of_motion * motion;
         }
     }
 }

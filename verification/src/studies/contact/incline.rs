@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 pub(super) const GRAVITY: f64 = 10.0;
 
 /// The time over which the acceleration is measured, and the time before it.
-const TIMES: [f64; 2] = [0.2, 0.8];
+pub(super) const TIMES: [f64; 2] = [0.2, 0.8];
 
 /// A body on the floor y = 1, under gravity at an angle of `degrees` to the normal of the floor.
 pub(super) fn scene(shape: Value, degrees: f64, friction: f64) -> Value {

@@ -2,6 +2,7 @@
 
 mod bar;
 mod between;
+mod free;
 mod incline;
 mod indentation;
 mod tangent;
@@ -12,7 +13,7 @@ use bfree::simulation::Simulation;
 use serde_json::Value;
 
 /// The summary in the list of studies.
-pub(super) const ABOUT: &str = "contact with obstacles and between bodies: tangent, impact of bars, sliding and rolling, a wedge, patch test, Hertz, discs";
+pub(super) const ABOUT: &str = "contact with obstacles and between bodies: tangent, impact of bars, sliding and rolling, a wedge, patch test, Hertz, discs, free obstacles";
 
 pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     let mut reports = tangent::reports()?;
@@ -23,6 +24,7 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     reports.push(between::slope(effort)?);
     reports.push(between::mirrored(effort)?);
     reports.push(wedge::report(effort)?);
+    reports.extend(free::reports(effort)?);
     reports.push(indentation::patch()?);
     if *effort == Effort::Full {
         reports.push(indentation::hertz()?);

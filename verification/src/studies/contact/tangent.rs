@@ -10,10 +10,10 @@ use crate::studies::StudyError;
 use crate::studies::tangent::{SPACING, cloud};
 use bfree::approximation::{Approximation, Bspline};
 use bfree::material::{Lame, NeoHookean};
-use bfree::mechanics::loads::{BodyContact, Curve, Facing, Motion, Obstacle, Partner, Rotation};
+use bfree::mechanics::loads::{BodyContact, Curve, Facing, Motion, Obstacle, Partner, RigidBody, Rotation};
 use bfree::shape::{Ball, Block, Cone, HalfSpace, Shape};
 use bfree::simulation::Simulation;
-use bfree::tensor::Vector;
+use bfree::tensor::{Tensor, Vector};
 
 /// A state of friction: its name, μ, and the distance of anchors from their points in spacings. Points are 0.05 spacings deep, and the
 /// smallest elastic slip is 0.005 spacings: in `stick` it is larger than μ times the depth.
@@ -54,7 +54,8 @@ fn dimension<const D: usize>(report: &mut Report) -> Result<(), StudyError> {
     }
     simulation.loads.contacts.between = None;
     for (shape, solid) in shapes(&middle) {
-        for turned in [false, true] {
+        for way in ["at rest", "turned", "free"] {
+            let turned = way == "turned";
             if D == 1 && turned {
                 continue;
             }
@@ -62,12 +63,14 @@ fn dimension<const D: usize>(report: &mut Report) -> Result<(), StudyError> {
             for (name, friction, slip) in STATES.into_iter().take(if D == 1 { 1 } else { STATES.len() }) {
                 let motion = std::array::from_fn(|_| turned.then(|| turning(middle)));
                 let mut obstacle = Obstacle::new("obstacle", solid.clone(), motion, 1.0, friction);
+                if way == "free" {
+                    obstacle.free = Some(free(&simulation, middle, &mut random));
+                }
                 let pose = obstacle.pose(simulation.clock.step());
                 let near = |at: usize| pose.to_frame(&simulation.particles.position[at]);
                 obstacle.anchors =
                     points.iter().map(|point| near(point.particle) + random.vector() * (slip * SPACING)).collect();
                 simulation.loads.contacts.obstacles = vec![obstacle];
-                let way = if turned { "turned" } else { "at rest" };
                 push(report, &simulation, [shape, name, way], slip, &mut random)?;
             }
         }
@@ -122,6 +125,25 @@ fn between<const D: usize>(
         }
     }
     between
+}
+
+/// A rigid body that turns about `center`, in the midst of a turn. Its mass resists as much as all points of contact.
+fn free<const D: usize>(
+    simulation: &Simulation<D, NeoHookean>,
+    center: Vector<f64, D>,
+    random: &mut Random,
+) -> RigidBody<D> {
+    let area: f64 = simulation.loads.contacts.points.iter().map(|point| point.area).sum();
+    let stiffness = bfree::material::p_wave_modulus(&simulation.bodies[0].law) / simulation.grid.spacing;
+    let mass = area * stiffness / simulation.settings.scheme.end(simulation.clock.step()).a1;
+    let inertia = Tensor::<f64, 3>::new(3.0, 0.4, 0.1, 0.4, 2.0, -0.2, 0.1, -0.2, 1.0) * (mass * SPACING * SPACING);
+    let spin = if D == 1 { Vector::zeros() } else { random.vector::<3>() };
+    let spin = if D == 2 { Vector::from([0.0, 0.0, spin[2]]) } else { spin };
+    let mut body = RigidBody::new(mass, inertia, center, random.vector() * 0.1, spin);
+    if let Some(turned) = bfree::shape::rotation::<3>(20.0, Some(&Vector::from([0.0, 0.0, 1.0]))).filter(|_| D > 1) {
+        body.rotation = turned;
+    }
+    body
 }
 
 /// A turn by a third of a radian in the first step.

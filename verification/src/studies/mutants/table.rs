@@ -51,6 +51,7 @@ const RESTARTS: Check = Check::Test("restart::");
 const TOUCHES: Check = Check::Study("contact");
 const OBSTACLES: Check = Check::Test("obstacles::");
 const BETWEEN: Check = Check::Test("between::");
+const FREE: Check = Check::Test("free_obstacles::");
 const ENERGY: Check = Check::Study("energy");
 const MEAN: Check = Check::Unit("mechanics::constitutive::discrete_gradient");
 const CONTACT_LAW: Check = Check::Unit("mechanics::contact");
@@ -113,6 +114,11 @@ pub(super) const FAULTS: &[ShippedFault] = &[
     fault("contact: joints of a group are surfaces", BETWEEN, OBSTACLES),
     fault("reference: contact is that of the old grid", BETWEEN, OBSTACLES),
     fault("contact: friction pushes forwards", OBSTACLES, LAWS),
+    fault("free obstacles: contact does not push back", FREE, OBSTACLES),
+    fault("free obstacles: forces do not turn with the obstacle", TOUCHES, OBSTACLES),
+    fault("free obstacles: the moment does not turn with the obstacle", TOUCHES, OBSTACLES),
+    fault("free obstacles: the tangent holds them", TOUCHES, OBSTACLES),
+    fault("free obstacles: they stay where forces are in balance", FREE, OBSTACLES),
     fault("contact: the slip is not along the surface", TOUCHES, LAWS),
     fault("contact: a slip does not move the anchor", OBSTACLES, LAWS),
     fault("obstacles: friction loses nothing", OBSTACLES, LAWS),

@@ -1,0 +1,158 @@
+//! Obstacles that move freely, in whole runs: momentum is kept, tangents are exact, and wrong scenes are refused.
+
+use crate::support::{Failure, advance, assert_refused, built, in_threads, merged, restored, run_to, solid, with};
+use bfree::mechanics::loads::RigidBody;
+use bfree::simulation::Simulation;
+use bfree::tensor::Vector;
+use serde_json::{Value, json};
+use std::num::NonZeroU64;
+
+/// A block that floats, and a rigid disc that spins and flies towards it, off its middle.
+fn flying() -> Value {
+    merged(
+        json!({
+            "grid": { "size": [4, 3], "spacing": 0.125 },
+            "time": { "step": 0.004, "end": 1 },
+            "bodies": [solid("block", 1000, json!({ "box": { "min": [1.5, 1], "max": [2, 2] } }))]
+        }),
+        json!({ "obstacles": [{ "name": "disc", "shape": { "ball": { "center": [1.1, 1.3], "radius": 0.35 } }, "friction": 0.3,
+                                "free": { "density": 2, "velocity": [3, 0.5], "spin": [-2] } }] }),
+    )
+}
+
+/// A ball in 3D on a corner of a block, with everything in motion.
+fn flying_3d() -> Value {
+    merged(
+        json!({
+            "grid": { "size": [2, 2, 2], "spacing": 0.25 },
+            "time": { "step": 0.01, "end": 1, "scheme": { "generalized_alpha": { "spectral_radius": 0.5 } } },
+            "gravity": { "acceleration": [1, -2, 0.5] },
+            "bodies": [solid("block", 1000, json!({ "box": { "min": [0.5, 0.5, 0.5], "max": [1.5, 1, 1.5] } }))]
+        }),
+        json!({ "obstacles": [{ "name": "brick", "shape": { "box": { "min": [0.5, 1.01, 0.4], "max": [1.2, 1.3, 1.3] } }, "friction": 0.4,
+                                "free": { "density": 1.5, "velocity": [1, -2, 0.3], "spin": [0.5, -2, 1] } }] }),
+    )
+}
+
+fn free<const D: usize>(simulation: &Simulation<D>) -> Result<&RigidBody<D>, Failure> {
+    Ok(simulation.loads.contacts.obstacles[0].free.as_ref().ok_or("the obstacle is not free")?)
+}
+
+/// Momentum and angular momentum about the origin, of the block and of the disc.
+fn momenta(simulation: &Simulation<2>) -> Result<[f64; 3], Failure> {
+    let (particles, disc) = (&simulation.particles, free(simulation)?);
+    let turning = |x: &Vector<f64, 2>, v: &Vector<f64, 2>| x[0] * v[1] - x[1] * v[0];
+    let of_block =
+        (0..particles.len()).map(|p| particles.mass[p] * turning(&particles.position[p], &particles.velocity[p]));
+    let v = Vector::from([disc.velocity[0], disc.velocity[1]]);
+    let linear = particles.momentum() + v * disc.mass;
+    let of_disc = disc.mass * turning(&disc.position, &v) + disc.inertia[(2, 2)] * disc.velocity[5];
+    Ok([linear[0], linear[1], of_block.sum::<f64>() + of_disc])
+}
+
+#[test]
+fn momentum_goes_from_the_obstacle_to_the_body_and_none_is_lost() -> Result<(), Failure> {
+    let mut simulation: Simulation<2> = built(&flying())?;
+    let (start, speed) = (momenta(&simulation)?, free(&simulation)?.velocity);
+    let mut touched = false;
+    while simulation.clock.time() < 0.3 {
+        touched |= simulation.advance()?.touches();
+    }
+    let (end, after) = (momenta(&simulation)?, free(&simulation)?.velocity);
+    assert!(touched && after[0] < 0.5 * speed[0] && (after[5] - speed[5]).abs() > 0.1, "{after}");
+    for k in 0..2 {
+        assert!((end[k] - start[k]).abs() < 1e-10 * start[0], "{start:?} {end:?}");
+    }
+    // Newmark's method keeps angular momentum to its order in the time step only.
+    assert!((end[2] - start[2]).abs() < 2e-3 * start[0], "{start:?} {end:?}");
+    Ok(())
+}
+
+#[test]
+fn the_energy_of_the_obstacle_is_its_work_on_the_body() -> Result<(), Failure> {
+    let mut simulation: Simulation<2> = built(&with(flying(), &[("/time/step", json!(0.001))]))?;
+    let start = free(&simulation)?.kinetic_energy();
+    run_to(&mut simulation, 0.3)?;
+    let disc = &simulation.loads.contacts.obstacles[0];
+    let lost = start - free(&simulation)?.kinetic_energy();
+    assert!(disc.work > 0.2 * start && (disc.work / lost - 1.0).abs() < 1e-3, "{} {lost}", disc.work);
+    Ok(())
+}
+
+#[test]
+fn the_tangent_is_exact_in_every_step_of_an_impact() -> Result<(), Failure> {
+    let (mut plane, mut space): (Simulation<2>, Simulation<3>) = (built(&flying())?, built(&flying_3d())?);
+    (plane.settings.check_tangent, space.settings.check_tangent) = (NonZeroU64::new(1), NonZeroU64::new(1));
+    let (mut touched, mut most) = ([0; 2], 0);
+    for _ in 0..25 {
+        let step = plane.advance()?;
+        touched[0] += u32::from(step.touches());
+        most = most.max(step.newton.history.iterations.len());
+        touched[1] += u32::from(space.advance()?.touches());
+    }
+    assert!(touched.into_iter().all(|count| count >= 5), "{touched:?}");
+    assert!(most <= 6, "{most} Newton iterations");
+    Ok(())
+}
+
+#[test]
+fn bits_depend_neither_on_restarts_nor_on_threads() -> Result<(), Failure> {
+    let state = |threads| {
+        in_threads(threads, || {
+            let mut simulation: Simulation<3> = built(&flying_3d())?;
+            advance(&mut simulation, 8)?;
+            Ok((simulation.particles, simulation.loads.contacts))
+        })
+    };
+    let whole = state(1)?;
+    assert_eq!(whole, state(3)?);
+    let start: Simulation<3> = built(&flying_3d())?;
+    let mut simulation = start.clone();
+    advance(&mut simulation, 5)?;
+    let mut continued = restored(&simulation, &start)?;
+    advance(&mut continued, 3)?;
+    assert_eq!((continued.particles, continued.loads.contacts), whole);
+    Ok(())
+}
+
+#[test]
+fn a_free_obstacle_that_meets_another_one_ends_the_run() -> Result<(), Failure> {
+    let wall = json!({ "name": "wall", "shape": { "box": { "min": [0, 2.2], "max": [1.4, 2.5] } } });
+    let mut scene = with(
+        flying(),
+        &[("/obstacles/0/free/velocity", json!([0, 3])), ("/obstacles/0/shape/ball/center", json!([0.5, 1.7]))],
+    );
+    scene["obstacles"].as_array_mut().ok_or("no list")?.push(wall);
+    let mut simulation: Simulation<2> = built(&scene)?;
+    let error = std::iter::repeat_with(|| simulation.advance()).take(100).find_map(Result::err).ok_or("nothing met")?;
+    let text = error.cause.to_string();
+    let words = ["\"disc\"", "\"wall\"", "do not push each other", "make one of the two a body"];
+    assert!(words.iter().all(|word| text.contains(word)), "{text}");
+    // From the start, this is an error of the scene.
+    scene["obstacles"][1]["shape"]["box"]["min"] = json!([0, 2]);
+    let text = built::<2>(&scene).err().map(|error| error.to_string()).unwrap_or_default();
+    assert!(text.contains("obstacles[0].free") && text.contains("starts in the obstacle \"wall\""), "{text}");
+    Ok(())
+}
+
+#[test]
+fn wrong_free_obstacles_are_refused() {
+    let profile = json!({ "acceleration": [0, -1], "profile": { "along": [1, 0], "factor": [[0, 1], [1, 2]] } });
+    for (pointer, value, path, words) in [
+        ("/obstacles/0/free/density", json!(0), "obstacles[0].free.density", &["> 0"][..]),
+        ("/obstacles/0/free/velocity", json!([1]), "obstacles[0].free.velocity", &["2"]),
+        ("/obstacles/0/free/spin", json!([1, 2, 3]), "obstacles[0].free.spin", &["one component in 2D"]),
+        ("/obstacles/0/velocity", json!([[0, [0, 0]]]), "obstacles[0]", &["velocity and free", "one of them"]),
+        (
+            "/obstacles/0/shape",
+            json!({ "half_space": { "point": [0, 0], "normal": [0, 1] } }),
+            "obstacles[0].shape",
+            &["bounded"],
+        ),
+        ("/time/scheme", json!("none"), "obstacles[0].free", &["without inertia"]),
+        ("/time/scheme", json!("energy_momentum"), "obstacles[0].free", &["energy_momentum"]),
+        ("/gravity", profile, "obstacles[0].free", &["gravity.profile"]),
+    ] {
+        assert_refused(&with(flying(), &[(pointer, value)]).to_string(), path, words);
+    }
+}
