@@ -10,6 +10,7 @@
 //! | `obstacles.csv` | force, moment, area and depth of contact, work and friction loss of every obstacle, if there are any |
 //! | `probes.csv` | fields at chosen particles or points, if any are asked for |
 //! | `particles.pvd`, `particles_*.vtu` | snapshots of the particles for ParaView |
+//! | `obstacles.pvd`, `obstacles_*.vtu` | the surfaces of the obstacles at the same times, if there are any |
 //! | `newton.jsonl` | Newton's method, one line per step; moved into `report.json` at the end, but also kept if there are checkpoints |
 //! | `report.json` | settings, outcome, counts, seconds by phase, Newton and Krylov iterations and residuals of every step, warnings |
 //!
@@ -26,6 +27,7 @@ pub(crate) mod files;
 pub mod history;
 mod losses;
 mod mark;
+mod outlines;
 pub(crate) mod path;
 pub mod plot;
 pub mod probes;

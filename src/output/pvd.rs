@@ -8,6 +8,9 @@ use std::path::{Path, PathBuf};
 /// The file of the series, in the directory of the run.
 pub(crate) const SERIES: &str = "particles.pvd";
 
+/// The series of the obstacles.
+pub(crate) const OBSTACLES: &str = "obstacles.pvd";
+
 /// Text before and after the entries.
 const HEAD: &str = "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\" byte_order=\"LittleEndian\">\n<Collection>\n";
 const TAIL: &str = "</Collection>\n</VTKFile>\n";

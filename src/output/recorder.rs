@@ -6,6 +6,7 @@ use super::files::Stream;
 use super::history::{self, Cost, Energies};
 use super::losses::Cause;
 use super::mark::Mark;
+use super::outlines::Outlines;
 use super::path::Point;
 use super::probes::{self, Probe};
 use super::progress::{Audience, Progress};
@@ -66,7 +67,7 @@ pub struct Recorder<const D: usize> {
     contacts: Option<Table>,
     probes: Vec<Probe<D>>,
     probed: Option<Table>,
-    snapshots: Option<Snapshots>,
+    snapshots: Option<Snapshots<D>>,
     newton: Stream,
     progress: Progress,
     /// The warnings, counts and seconds so far; the total of the seconds counts the time before `since`. Ends of files are those of the last
@@ -146,8 +147,13 @@ impl<const D: usize> Recorder<D> {
             .then(|| table("probes.csv", &probes::row(&probes, simulation, &reference)?))
             .transpose()?;
         let written = so_far.snapshots.unwrap_or_default();
-        let snapshots =
-            snapshot_every.map(|every| Snapshots::new(directory.clone(), &fields, every, written)).transpose()?;
+        let snapshots = snapshot_every
+            .map(|every| {
+                let outlines =
+                    (!loads.contacts.obstacles.is_empty()).then(|| Outlines::of(&loads.contacts, &simulation.grid));
+                Snapshots::new(directory.clone(), &fields, outlines, every, written)
+            })
+            .transpose()?;
         Ok(Self {
             history,
             reactions,

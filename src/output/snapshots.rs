@@ -1,7 +1,8 @@
-//! Snapshots of the particles: `particles_*.vtu`, and the series `particles.pvd`.
+//! Snapshots of the particles and of the obstacles: `particles_*.vtu`, `obstacles_*.vtu`, and the series `particles.pvd` and `obstacles.pvd`.
 
 use super::fields::padded;
-use super::pvd::{self, SERIES};
+use super::outlines::Outlines;
+use super::pvd::{self, OBSTACLES, SERIES};
 use super::vtu::{Array, Background, Snapshot};
 use super::{OutputError, Reference};
 use crate::clock::Clock;
@@ -13,11 +14,13 @@ use std::path::{Path, PathBuf};
 
 /// Writes snapshots.
 #[derive(Debug)]
-pub(crate) struct Snapshots {
+pub(crate) struct Snapshots<const D: usize> {
     directory: PathBuf,
     fields: Vec<Field>,
-    /// The entries of the series.
-    entries: String,
+    /// The obstacles, if there are any.
+    outlines: Option<Outlines<D>>,
+    /// The entries of the series of particles, and of that of obstacles.
+    entries: [String; 2],
     /// Time between snapshots.
     every: f64,
     pub(crate) mark: SnapshotMark,
@@ -34,9 +37,18 @@ pub(crate) struct SnapshotMark {
     passed: Option<f64>,
 }
 
-/// File name of a snapshot.
-fn name(number: usize) -> String {
-    format!("particles_{number:06}.vtu")
+/// File names of a snapshot of particles begin with this, and of one of obstacles.
+const STEMS: [&str; 2] = ["particles_", "obstacles_"];
+
+/// File names of a snapshot of particles, and of one of obstacles.
+fn names(number: usize) -> [String; 2] {
+    STEMS.map(|stem| format!("{stem}{number:06}.vtu"))
+}
+
+/// The file of the obstacles beside a file of particles.
+pub(crate) fn obstacles_beside(particles: &Path) -> Option<PathBuf> {
+    let name = particles.file_name()?.to_str()?.strip_prefix(STEMS[0])?;
+    Some(particles.with_file_name(format!("{}{name}", STEMS[1]))).filter(|path| path.is_file())
 }
 
 impl SnapshotMark {
@@ -51,23 +63,25 @@ impl SnapshotMark {
 
     /// The written snapshots that are not in `directory`.
     pub(crate) fn missing(&self, directory: &Path) -> Vec<PathBuf> {
-        (0..self.written).map(|number| directory.join(name(number))).filter(|path| !path.is_file()).collect()
+        (0..self.written).map(|number| directory.join(&names(number)[0])).filter(|path| !path.is_file()).collect()
     }
 
     /// Whether a file of this name is a snapshot that was written later.
     pub(crate) fn precedes(&self, name: &str) -> bool {
-        let number = name.strip_prefix("particles_").and_then(|rest| rest.strip_suffix(".vtu"));
+        let rest = STEMS.iter().find_map(|stem| name.strip_prefix(stem));
+        let number = rest.and_then(|rest| rest.strip_suffix(".vtu"));
         let digits = number.filter(|number| number.len() >= 6 && number.bytes().all(|b| b.is_ascii_digit()));
         digits.is_some_and(|digits| digits.parse().map_or(true, |number: usize| number >= self.written))
     }
 }
 
-impl Snapshots {
+impl<const D: usize> Snapshots<D> {
     /// Snapshots of `fields` in `directory`, due whenever the time passes a multiple of `every`. A repeated field is written once. The
     /// snapshots up to `mark` are continued.
     pub(crate) fn new(
         directory: PathBuf,
         fields: &[Field],
+        outlines: Option<Outlines<D>>,
         every: f64,
         mark: SnapshotMark,
     ) -> Result<Self, OutputError> {
@@ -75,13 +89,16 @@ impl Snapshots {
             return Err(OutputError::SnapshotEvery(every));
         }
         let unique = fields.iter().enumerate().filter(|&(k, field)| !fields[..k].contains(field));
-        let mut entries = String::new();
-        if mark.written > 0 {
-            let path = directory.join(SERIES);
-            entries = pvd::first_entries(&path, mark.written)?;
-            pvd::write(&path, &entries)?;
+        let mut entries = [const { String::new() }; 2];
+        let series = [Some(SERIES), outlines.as_ref().map(|_| OBSTACLES)];
+        for (entries, series) in entries.iter_mut().zip(series).filter(|_| mark.written > 0) {
+            let Some(series) = series else { continue };
+            let path = directory.join(series);
+            *entries = pvd::first_entries(&path, mark.written)?;
+            pvd::write(&path, entries)?;
         }
-        Ok(Self { fields: unique.map(|(_, &field)| field).collect(), directory, entries, every, mark })
+        let fields = unique.map(|(_, &field)| field).collect();
+        Ok(Self { fields, directory, outlines, entries, every, mark })
     }
 
     /// Whether the time has reached a multiple of `every` since the last call that was due, or there was no such call.
@@ -95,7 +112,7 @@ impl Snapshots {
     }
 
     /// Writes the present state, unless it is already written.
-    pub(crate) fn write<const D: usize, L: Law, A>(
+    pub(crate) fn write<L: Law, A>(
         &mut self,
         simulation: &Simulation<D, L, A>,
         reference: &Reference<D>,
@@ -104,13 +121,25 @@ impl Snapshots {
         if self.mark.last == Some(step) {
             return Ok(());
         }
-        let file = name(self.mark.written);
-        snapshot(simulation, reference, &self.fields)?.write(&self.directory.join(&file))?;
-        self.entries += &pvd::entry(simulation.clock.time(), &file);
-        pvd::write(&self.directory.join(SERIES), &self.entries)?;
+        let [file, of_obstacles] = names(self.mark.written);
+        let particles = snapshot(simulation, reference, &self.fields)?;
+        if let Some(outlines) = &self.outlines {
+            let outlines = outlines.at(&simulation.loads.contacts, simulation.clock.time(), &particles);
+            self.add(1, OBSTACLES, &outlines, &of_obstacles)?;
+        }
+        self.add(0, SERIES, &particles, &file)?;
         self.mark.written += 1;
         self.mark.last = Some(step);
         Ok(())
+    }
+}
+
+impl<const D: usize> Snapshots<D> {
+    /// Writes a file, and its entry in a series.
+    fn add(&mut self, which: usize, series: &str, snapshot: &Snapshot, file: &str) -> Result<(), OutputError> {
+        snapshot.write(&self.directory.join(file))?;
+        self.entries[which] += &pvd::entry(snapshot.time, file);
+        pvd::write(&self.directory.join(series), &self.entries[which])
     }
 }
 
@@ -146,5 +175,6 @@ pub(crate) fn snapshot<const D: usize, L: Law, A>(
         },
         points: places.iter().map(|&p| padded(&particles.position[p as usize])).collect(),
         arrays: arrays.collect::<Result<_, OutputError>>()?,
+        corners: 1,
     })
 }

@@ -1,4 +1,4 @@
-//! Snapshots as VTK's `.vtu`: an unstructured grid of vertices, arrays appended raw in zlib blocks, little endian.
+//! Snapshots as VTK's `.vtu`: an unstructured grid of vertices, segments or triangles, arrays appended raw in zlib blocks, little endian.
 //!
 //! Format: "VTK File Formats" of the VTK documentation. ParaView, pyvista and meshio read the files. [`Snapshot::read`] reads the files of
 //! [`Snapshot::write`] bit for bit.
@@ -14,8 +14,8 @@ use std::path::Path;
 /// Bytes of an uncompressed block.
 const BLOCK: usize = 1 << 16;
 
-/// VTK's type of a cell that is one point.
-const VERTEX: u8 = 1;
+/// VTK's types of cells with one point, two and three: vertex, line and triangle.
+const TYPES: [u8; 3] = [1, 3, 5];
 
 /// An array with one tuple for each point.
 #[derive(Clone, Debug, PartialEq)]
@@ -70,6 +70,7 @@ impl Background {
 ///     background: Background { dimension: 1, origin: [0.0; 3], spacing: 0.5, cells: [4, 0, 0] },
 ///     points: vec![[0.25, 0.0, 0.0], [1e-300, 0.0, 0.0]],
 ///     arrays: vec![speed],
+///     corners: 1,
 /// };
 /// let folder = tempfile::tempdir()?;
 /// let path = folder.path().join("particles_0.vtu");
@@ -87,6 +88,8 @@ pub struct Snapshot {
     pub points: Vec<[f64; 3]>,
     /// Arrays of the points.
     pub arrays: Vec<Array>,
+    /// The number of points of a cell: 1 for particles, 2 for segments, 3 for triangles. No cells share a point.
+    pub corners: usize,
 }
 
 /// A file under construction: the XML, and the appended data to which it refers by offsets.
@@ -152,9 +155,10 @@ impl Snapshot {
         parts.field("Float64", "grid_origin", origin);
         parts.field("Float64", "grid_spacing", &[spacing]);
         parts.field("UInt32", "grid_cells", cells);
-        let count = self.points.len();
+        let (count, corners) = (self.points.len(), self.corners.clamp(1, TYPES.len()));
+        let cells = count / corners;
         parts.xml +=
-            &format!("</FieldData>\n<Piece NumberOfPoints=\"{count}\" NumberOfCells=\"{count}\">\n<PointData>\n");
+            &format!("</FieldData>\n<Piece NumberOfPoints=\"{count}\" NumberOfCells=\"{cells}\">\n<PointData>\n");
         for Array { name, components, values, is_index } in &self.arrays {
             if *is_index {
                 let whole: Vec<u8> = values.iter().flat_map(|&x| (x as u32).to_le_bytes()).collect();
@@ -166,10 +170,11 @@ impl Snapshot {
         parts.xml += "</PointData>\n<Points>\n";
         parts.array("Float64", "Points", &["x", "y", "z"], &bytes(self.points.as_flattened()));
         parts.xml += "</Points>\n<Cells>\n";
-        let integers = |first: i64| (first..first + count as i64).flat_map(i64::to_le_bytes).collect::<Vec<u8>>();
-        parts.array("Int64", "connectivity", &[""], &integers(0));
-        parts.array("Int64", "offsets", &[""], &integers(1));
-        parts.array("UInt8", "types", &[""], &vec![VERTEX; count]);
+        let ends = (1..=cells).map(|cell| (cell * corners) as i64).flat_map(i64::to_le_bytes).collect::<Vec<u8>>();
+        let all = (0..count as i64).flat_map(i64::to_le_bytes).collect::<Vec<u8>>();
+        parts.array("Int64", "connectivity", &[""], &all);
+        parts.array("Int64", "offsets", &[""], &ends);
+        parts.array("UInt8", "types", &[""], &vec![TYPES[corners - 1]; cells]);
         parts.xml += "</Cells>\n</Piece>\n</UnstructuredGrid>\n<AppendedData encoding=\"raw\">\n_";
         write_atomically(path, |file| {
             file.write_all(parts.xml.as_bytes())?;
@@ -208,17 +213,19 @@ impl Snapshot {
         };
         background.check()?;
         let time = scalar("TimeValue")?;
-        let count = xml
-            .split_once("<Piece")
-            .and_then(|(_, piece)| attribute(piece.split('>').next()?, "NumberOfPoints")?.parse::<usize>().ok())
-            .ok_or("no number of points")?;
+        let size = |name: &str| {
+            let number = |piece: &str| attribute(piece.split('>').next()?, name)?.parse::<usize>().ok();
+            xml.split_once("<Piece").and_then(|(_, piece)| number(piece)).ok_or(format!("no {name}"))
+        };
+        let count = size("NumberOfPoints")?;
+        let corners = count.checked_div(size("NumberOfCells")?).unwrap_or(1);
         // The arrays of the cells have other types and hold no information.
         let holds_numbers = |tag: &str| matches!(attribute(tag, "type"), Some("Float64" | "UInt32"));
         let appended = |tag: &str| attribute(tag, "format") == Some("appended") && holds_numbers(tag);
         let tags = elements(xml).map(|(tag, _)| tag).filter(|tag| appended(tag));
         let mut arrays = tags.map(|tag| read_array(tag, data, count)).collect::<Result<Vec<_>, _>>()?;
         let points = arrays.pop_if(|array| array.name == "Points").ok_or("no points")?;
-        Ok(Self { time, background, points: points.values.as_chunks().0.to_vec(), arrays })
+        Ok(Self { time, background, points: points.values.as_chunks().0.to_vec(), arrays, corners })
     }
 }
 
@@ -301,6 +308,7 @@ mod tests {
                 array("jacobian", &[""], (0..count).map(x).collect()),
                 array("body", &[""], (0..count).map(|k| k as f64).collect()),
             ],
+            corners: 1,
         }
     }
 

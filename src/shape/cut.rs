@@ -40,6 +40,29 @@ impl<const D: usize> Facet<D> {
         Self { position, normal, area, spread: squares / (D * (D + 1)) as f64, turn: Tensor::zeros() }
     }
 
+    /// Adds the corners of simplices of the same area in the plane of the facet: a point, a segment, or the two triangles of a square.
+    fn add_square(&self, corners: &mut Vec<Vector<f64, D>>) {
+        let normal = self.normal.normalize();
+        let half = if D == 3 { 0.5 * self.area.sqrt() } else { 0.5 * self.area };
+        // Tangents: the axes without their part along the normal, the one nearest to the normal left out.
+        let axes: Vec<Vector<f64, D>> = (0..D)
+            .filter(|&k| k != normal.iamax())
+            .map(|k| {
+                let axis = Vector::from_fn(|i, _| f64::from(i == k));
+                axis - normal * normal[k]
+            })
+            .collect();
+        let at = |shares: &[f64]| {
+            axes.iter().zip(shares).fold(self.position, |x, (axis, share)| x + axis.normalize() * (half * share))
+        };
+        let of_square: &[[f64; 2]] = match D {
+            1 => &[[0.0, 0.0]],
+            2 => &[[-1.0, 0.0], [1.0, 0.0]],
+            _ => &[[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]],
+        };
+        corners.extend(of_square.iter().map(|shares| at(shares)));
+    }
+
     /// The union of two facets.
     fn and(&self, other: &Self) -> Self {
         let area = self.area + other.area;
@@ -200,6 +223,21 @@ impl<const D: usize> Shape<D> {
             }
         });
         sides
+    }
+
+    /// Adds the corners of simplices that approximate the surface in a box, D corners each. A surface of triangles or pixels has squares or
+    /// segments of the size and direction of its facets.
+    pub(crate) fn add_surface(&self, of: &GridBox<D>, flat: f64, corners: &mut Vec<Vector<f64, D>>) {
+        let (center, radius) = of.around();
+        if let Some((part, _)) = self.solid().alone(&center, radius) {
+            part.add_surface(of, flat, corners);
+        } else if let Some(facets) = self.solid().facets(of, &[]) {
+            facets.iter().for_each(|facet| facet.add_square(corners));
+        } else {
+            self.pieces(None, of, flat, &mut |piece, cut| {
+                corners.extend(self.ends(&piece, cut, of.round_off()).into_iter().flat_map(|end| end.corners));
+            });
+        }
     }
 
     /// The sides of a piece that lie on the surface of the solid.

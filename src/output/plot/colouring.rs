@@ -111,7 +111,13 @@ mod tests {
             is_index: false,
         };
         let background = Background { dimension, origin: [0.0; 3], spacing: 1.0, cells: [2; 3] };
-        Snapshot { time: 0.0, background, points: vec![[0.5; 3]], arrays: arrays.iter().map(array).collect() }
+        Snapshot {
+            time: 0.0,
+            background,
+            points: vec![[0.5; 3]],
+            arrays: arrays.iter().map(array).collect(),
+            corners: 1,
+        }
     }
 
     #[test]

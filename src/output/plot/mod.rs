@@ -25,6 +25,7 @@ pub use convergence::newton_norms;
 pub use view::View;
 
 use super::files::write_atomically;
+use super::snapshots::obstacles_beside;
 use super::vtu::Snapshot;
 use super::{OutputError, pvd};
 use axes::extremes;
@@ -118,11 +119,11 @@ pub fn plot_run(directory: &Path, look: &Look) -> Result<Vec<PathBuf>, OutputErr
     // The particles are not on the page: the player shows them.
     let mut particles = None;
     if let Some(recording) = &recording {
-        let snapshot = at_time(directory, &snapshots, look.time)?;
+        let (snapshot, obstacles) = at_time(directory, &snapshots, look.time)?;
         let colouring = Colouring::chosen(&snapshot, look.field.as_deref())?;
         let span = colouring.as_ref().map_or((0.0, 1.0), Colouring::extremes);
         let scene = scene(look, recording, span, &report);
-        particles = Some(("particles", particles::draw(&snapshot, &scene, colouring.as_ref())));
+        particles = Some(("particles", particles::draw(&snapshot, obstacles.as_ref(), &scene, colouring.as_ref())));
     }
     let mut written = Vec::new();
     let mut keep = |file: &str, content: &[u8]| -> Result<(), OutputError> {
@@ -142,19 +143,28 @@ pub fn plot_run(directory: &Path, look: &Look) -> Result<Vec<PathBuf>, OutputErr
     Ok(written)
 }
 
-/// The snapshot nearest to a time; without a time, the last snapshot.
-fn at_time(directory: &Path, snapshots: &[PathBuf], time: Option<f64>) -> Result<Snapshot, OutputError> {
+/// The snapshot nearest to a time, with its obstacles; without a time, the last snapshot.
+fn at_time(
+    directory: &Path,
+    snapshots: &[PathBuf],
+    time: Option<f64>,
+) -> Result<(Snapshot, Option<Snapshot>), OutputError> {
     let [earlier @ .., last] = snapshots else { return Err(OutputError::NoSnapshots(directory.to_owned())) };
-    let mut nearest = Snapshot::read(last)?;
-    let Some(time) = time else { return Ok(nearest) };
+    let (mut nearest, mut file) = (Snapshot::read(last)?, last);
     for path in earlier.iter().rev() {
+        let Some(time) = time else { break };
         let snapshot = Snapshot::read(path)?;
         if (nearest.time - time).abs() <= (snapshot.time - time).abs() {
             break;
         }
-        nearest = snapshot;
+        (nearest, file) = (snapshot, path);
     }
-    Ok(nearest)
+    Ok((nearest, obstacles(file)?))
+}
+
+/// The obstacles beside a snapshot of particles, if there are any.
+fn obstacles(particles: &Path) -> Result<Option<Snapshot>, OutputError> {
+    obstacles_beside(particles).map(|path| Snapshot::read(&path)).transpose()
 }
 
 /// The settings that all pictures of the particles of a run have in common.
@@ -264,7 +274,8 @@ pub fn plot_frames(directory: &Path, frames: &Path, look: &Look) -> Result<Vec<P
     let mut written = Vec::new();
     for (number, path) in snapshots.iter().enumerate() {
         let snapshot = Snapshot::read(path)?;
-        let svg = particles::draw(&snapshot, &scene, Colouring::chosen(&snapshot, look.field.as_deref())?.as_ref());
+        let colouring = Colouring::chosen(&snapshot, look.field.as_deref())?;
+        let svg = particles::draw(&snapshot, obstacles(path)?.as_ref(), &scene, colouring.as_ref());
         let (png, path) = (png::from_svg("a frame", &svg)?, frames.join(format!("frame_{number:04}.png")));
         write_atomically(&path, |file| file.write_all(&png))?;
         written.push(path);

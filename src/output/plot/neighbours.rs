@@ -115,7 +115,7 @@ mod tests {
 
     fn snapshot(points: Vec<[f64; 3]>) -> Snapshot {
         let background = Background { dimension: 2, origin: [0.0; 3], spacing: 1.0, cells: [9, 9, 0] };
-        Snapshot { time: 0.0, background, points, arrays: vec![] }
+        Snapshot { time: 0.0, background, points, arrays: vec![], corners: 1 }
     }
 
     #[test]

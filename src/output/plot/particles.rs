@@ -55,7 +55,12 @@ struct Frame<'a> {
 }
 
 /// The picture as SVG. In one dimension the field is drawn over x.
-pub(super) fn draw(snapshot: &Snapshot, scene: &Scene, colouring: Option<&Colouring>) -> String {
+pub(super) fn draw(
+    snapshot: &Snapshot,
+    obstacles: Option<&Snapshot>,
+    scene: &Scene,
+    colouring: Option<&Colouring>,
+) -> String {
     let span = range([scene.span.0, scene.span.1].into_iter(), 0.0);
     let label = colouring.map_or("particles", |one| &one.label);
     let stride = snapshot.points.len().div_ceil(MAX_DRAWN).max(1);
@@ -87,6 +92,9 @@ pub(super) fn draw(snapshot: &Snapshot, scene: &Scene, colouring: Option<&Colour
         None => edges(&mut svg, scene, &axes),
     }
     frame.bodies(&mut svg, &axes, span);
+    if let (Some(obstacles), Some(plane)) = (obstacles.filter(|one| one.corners == 2), flat) {
+        outlines(&mut svg, obstacles, &axes, plane);
+    }
     if colouring.is_some() {
         colour_bar(&mut svg, &axes, span, &bar, label);
     }
@@ -144,6 +152,34 @@ fn grid(svg: &mut Svg, snapshot: &Snapshot, axes: &Axes, plane: [usize; 2], scal
     for y in inside(axes.y, plane[1]) {
         svg.line([axes.place((axes.x.0, y)), axes.place((axes.x.1, y))], LIGHT, 0.8);
     }
+}
+
+/// Draws the segments of obstacles in the plane, clipped to the drawing.
+fn outlines(svg: &mut Svg, obstacles: &Snapshot, axes: &Axes, [right, up]: [usize; 2]) {
+    for ends in obstacles.points.chunks_exact(2) {
+        let at = |end: [f64; 3]| [end[right], end[up]];
+        if let Some(inside) = clipped([at(ends[0]), at(ends[1])], [axes.x, axes.y]) {
+            svg.line(inside.map(|[x, y]| axes.place((x, y))), BLACK, 1.6);
+        }
+    }
+}
+
+/// The part of a segment in a rectangle, if any (Liang and Barsky, 1984).
+fn clipped([start, end]: [[f64; 2]; 2], ranges: [(f64, f64); 2]) -> Option<[[f64; 2]; 2]> {
+    let (mut first, mut last) = (0.0_f64, 1.0_f64);
+    for (k, (low, high)) in ranges.into_iter().enumerate() {
+        let along = end[k] - start[k];
+        if along == 0.0 {
+            if start[k] < low || start[k] > high {
+                return None;
+            }
+            continue;
+        }
+        let (a, b) = ((low - start[k]) / along, (high - start[k]) / along);
+        (first, last) = (first.max(a.min(b)), last.min(a.max(b)));
+    }
+    let at = |share: f64| [0, 1].map(|k| start[k] + share * (end[k] - start[k]));
+    (first < last).then(|| [at(first), at(last)])
 }
 
 /// Draws the edges of the box behind the particles, and labels along one edge of each axis at the outline.
@@ -316,7 +352,13 @@ mod tests {
         let values = (0..count).map(|p| 1e7 * p as f64).collect();
         let array = Array { name: "von_mises".into(), components: vec!["".into()], values, is_index: false };
         let background = Background { dimension, origin: [from; 3], spacing: 1.0, cells: [4; 3] };
-        Snapshot { time: 0.1 + 0.2, background, points: (0..count).map(place).collect(), arrays: vec![array] }
+        Snapshot {
+            time: 0.1 + 0.2,
+            background,
+            points: (0..count).map(place).collect(),
+            arrays: vec![array],
+            corners: 1,
+        }
     }
 
     fn picture(snapshot: &Snapshot, view: Option<View>) -> Result<String, OutputError> {
@@ -330,7 +372,7 @@ mod tests {
             span: colouring.as_ref().map_or((0.0, 1.0), Colouring::extremes),
             run: "A scene with a title".into(),
         };
-        Ok(draw(snapshot, &scene, colouring.as_ref()))
+        Ok(draw(snapshot, None, &scene, colouring.as_ref()))
     }
 
     #[test]
@@ -361,6 +403,16 @@ mod tests {
         assert_eq!((count(&plane, "<polygon"), count(&plane, "<circle")), (16 + 128, 0));
         assert_eq!((count(&space, "<polygon"), count(&space, "<circle")), (128, 64));
         Ok(())
+    }
+
+    #[test]
+    fn outlines_end_at_the_drawing() {
+        let square = [(0.0, 2.0), (0.0, 1.0)];
+        assert_eq!(clipped([[-1.0, 0.5], [3.0, 0.5]], square), Some([[0.0, 0.5], [2.0, 0.5]]));
+        assert_eq!(clipped([[1.0, -1.0], [1.0, 0.5]], square), Some([[1.0, 0.0], [1.0, 0.5]]));
+        assert_eq!(clipped([[0.5, 0.25], [1.0, 0.5]], square), Some([[0.5, 0.25], [1.0, 0.5]]));
+        assert_eq!(clipped([[-1.0, 0.5], [1.0, 2.5]], square), None);
+        assert_eq!(clipped([[-1.0, 2.0], [3.0, 2.0]], square), None);
     }
 
     #[test]

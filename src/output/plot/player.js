@@ -286,6 +286,12 @@
       pen.strokeStyle = "rgba(0,0,0,.5)";
       const [a, b] = [project(run.origin, now), project(end, now)];
       pen.strokeRect(a[0], b[1], b[0] - a[0], a[1] - b[1]);
+      // Obstacles that do not move are written once.
+      const outline = run.outlines.slice(0, state.frame + 1).findLast((segments) => segments !== null) ?? [];
+      const at = (k) => project([0, 1, 2].map((i) => (i < 2 ? run.origin[i] + (outline[k + i] * run.cell) / 1000 : 0)), now);
+      [pen.strokeStyle, pen.lineWidth] = ["#000", 1.6];
+      for (let k = 0; k + 3 < outline.length; k += 4) line(at(k), at(k + 2));
+      pen.lineWidth = 1;
     }
     pen.restore();
     pen.strokeStyle = pen.fillStyle = "#444";

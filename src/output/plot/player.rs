@@ -6,6 +6,7 @@ use super::neighbours::Neighbours;
 use super::palette::VIRIDIS;
 use crate::output::OutputError;
 use crate::output::history::AXES;
+use crate::output::snapshots::obstacles_beside;
 use crate::output::vtu::{Array, Background, Snapshot};
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
@@ -55,6 +56,9 @@ impl Channel {
 pub(super) struct Recording {
     pub(super) background: Background,
     times: Vec<f64>,
+    /// The segments of obstacles in the plane at each time: both ends, in thousandths of a cell from the origin of the grid. `None` where the
+    /// segments are those of the snapshot before.
+    outlines: Vec<Option<Vec<i64>>>,
     /// Number of all snapshots, and of all particles.
     snapshots: usize,
     particles: usize,
@@ -79,6 +83,7 @@ impl Recording {
         let mut recording = Self {
             background: first.background,
             times: Vec::new(),
+            outlines: Vec::new(),
             snapshots: files.len(),
             particles,
             shown: ids.len(),
@@ -100,6 +105,10 @@ impl Recording {
             return Err(OutputError::content(path, "has other particles or fields than the first snapshot of the run"));
         }
         self.times.push(snapshot.time);
+        let obstacles = obstacles_beside(path).map(|path| Snapshot::read(&path)).transpose()?;
+        let segments = obstacles.filter(|obstacles| obstacles.corners == 2).map(|obstacles| self.in_cells(&obstacles));
+        let before = self.outlines.iter().rev().flatten().next();
+        self.outlines.push(segments.filter(|segments| Some(segments) != before));
         for axis in 0..3 {
             let (low, high) = extremes(snapshot.points.iter().map(|point| point[axis]));
             self.bounds[0][axis] = self.bounds[0][axis].min(low);
@@ -115,6 +124,13 @@ impl Recording {
             channel.values.extend(values);
         }
         Ok(())
+    }
+
+    /// Both ends of all segments, in thousandths of a cell from the origin of the grid.
+    fn in_cells(&self, segments: &Snapshot) -> Vec<i64> {
+        let Background { origin, spacing, .. } = self.background;
+        let in_plane = segments.points.iter().flat_map(|x| [x[0] - origin[0], x[1] - origin[1]]);
+        in_plane.map(|x| (1000.0 * x / spacing).round() as i64).collect()
     }
 
     /// Horizontal and vertical axis of the pictures.
@@ -156,7 +172,7 @@ impl Recording {
         let meta = json!({
             "dimension": dimension, "origin": origin, "cell": spacing, "cells": cells, "right": right, "up": up,
             "times": self.times, "snapshots": self.snapshots, "particles": self.particles, "shown": self.shown,
-            "channels": list, "colours": VIRIDIS,
+            "channels": list, "colours": VIRIDIS, "outlines": self.outlines,
         });
         Played {
             meta: meta.to_string().replace('<', "\\u003c"),
