@@ -7,11 +7,12 @@
 
 use crate::mechanics::contact::{ContactPoint, Response};
 use crate::mechanics::loads::RigidBody;
-use crate::mechanics::loads::rigid_body::{in_space, in_use, skew, stacked};
+use crate::mechanics::loads::rigid_body::{in_space, in_use, skew, stacked, translation, turn};
 use crate::mechanics::schemes::Alphas;
 use crate::scalar::Real;
 use crate::tensor::{Tensor, Vector, embed};
 use nalgebra::{Matrix3x6, Matrix6x3, SMatrix};
+use std::f64::consts::PI;
 
 /// The largest number of Newton iterations.
 const MOST_ITERATIONS: usize = 50;
@@ -39,7 +40,7 @@ pub(crate) struct FreeMotion {
     pub q: Vector<f64, 6>,
     /// (∂r/∂q)⁻¹
     pub inverse_slope: Tensor<f64, 6>,
-    /// Whether forces are in balance there.
+    /// Whether forces are in balance there. A turn by more than π in a step is not accepted.
     pub is_balanced: bool,
 }
 
@@ -54,24 +55,30 @@ pub(crate) struct FreePoint<const D: usize> {
 impl<const D: usize> FreeBalance<'_, D> {
     /// q with r(q) = 0. `points_at` gives the points in contact after a motion.
     pub fn solve(&self, points_at: impl Fn(&Vector<f64, 6>) -> Vec<ContactPoint<f64, D>>) -> FreeMotion {
-        let mut q = self.alphas.predicted(&self.body.velocity, &self.body.acceleration);
+        // At t_n the pose is known.
+        if self.alphas.dt == 0.0 {
+            return FreeMotion { q: Vector::zeros(), inverse_slope: Tensor::zeros(), is_balanced: true };
+        }
+        let mut q = within_half_turn(self.alphas.predicted(&self.body.velocity, &self.body.acceleration));
         let mut points = points_at(&q);
         let mut residual = self.residual(&q, &points);
         for _ in 0..MOST_ITERATIONS {
             let Some(step) = self.slope(&q, &points).lu().solve(&-residual) else { break };
             if self.length(&step) <= LAST_STEP * self.spacing {
-                return self.found(q + step, &points_at(&(q + step)), true);
+                let q = within_half_turn(q + step);
+                return self.found(q, &points_at(&q), true);
             }
             let (mut share, before) = (1.0, self.size(&residual));
             for _ in 0..=MOST_HALVINGS {
-                points = points_at(&(q + step * share));
-                residual = self.residual(&(q + step * share), &points);
+                let trial = within_half_turn(q + step * share);
+                points = points_at(&trial);
+                residual = self.residual(&trial, &points);
                 if self.size(&residual) < before {
                     break;
                 }
                 share *= 0.5;
             }
-            q += step * share;
+            q = within_half_turn(q + step * share);
         }
         self.found(q, &points, false)
     }
@@ -80,7 +87,8 @@ impl<const D: usize> FreeBalance<'_, D> {
         let inverse = self.slope(&q, points).try_inverse();
         let inverse_slope = inverse.unwrap_or_else(Tensor::zeros);
         let q = q - inverse_slope * self.residual(&q, points);
-        FreeMotion { q, inverse_slope, is_balanced: is_balanced && inverse.is_some() }
+        let is_balanced = is_balanced && inverse.is_some() && turn(&q).norm() < PI;
+        FreeMotion { q, inverse_slope, is_balanced }
     }
 
     /// q with all derivatives that `T` carries, by the implicit function theorem. Each iteration makes one more order of them right.
@@ -204,6 +212,12 @@ impl<const D: usize> FreePoint<D> {
 /// −∂f/∂x of the whole force, at a fixed pose.
 fn stiffness<const D: usize>(one: &ContactPoint<f64, D>) -> Tensor<f64, D> {
     one.stiffness_of(Response::Pressure) + one.stiffness_of(Response::Friction)
+}
+
+/// A motion whose turn is shortened to π where it is longer. Longer turns need more terms of their series.
+fn within_half_turn(q: Vector<f64, 6>) -> Vector<f64, 6> {
+    let share = (PI / turn(&q).norm()).min(1.0);
+    stacked(&translation(&q), &(turn(&q) * share))
 }
 
 /// Adds a block to three columns.

@@ -17,8 +17,9 @@ use super::warnings::Watched;
 use super::{OutputError, Reference, Summary};
 use crate::approximation::ShapeFunction;
 use crate::field::Field;
+use crate::grid::Grid;
 use crate::material::Law;
-use crate::mechanics::loads::Reaction;
+use crate::mechanics::loads::{Obstacle, Reaction};
 use crate::simulation::{ContactForces, Simulation, StepReport};
 use serde_json::{Map, Value};
 use std::path::PathBuf;
@@ -240,6 +241,25 @@ impl<const D: usize> Recorder<D> {
             limited: attempts().map(|one| one.counts.krylov_limited).sum(),
             stagnated: attempts().map(|one| one.counts.krylov_stagnated).sum(),
         };
+        let known = self.so_far.watch.warnings.len();
+        self.so_far.watch.see(&seen);
+        self.see_contacts(&seen, simulation, step);
+        if settings.scheme.follows_path() {
+            self.so_far.watch.see_path(&seen, Point::of(simulation, &self.reference), step.straight);
+        }
+        self.so_far.watch.warnings[known..].iter().for_each(|warning| self.progress.warn(warning));
+        self.progress.show(time, number, &cost, settings.scheme.has_inertia().then_some(energies.balance));
+        Ok(())
+    }
+
+    /// Examines contact with obstacles and between bodies.
+    fn see_contacts<L: Law, A: ShapeFunction>(
+        &mut self,
+        seen: &Watched<'_>,
+        simulation: &Simulation<D, L, A>,
+        step: &StepReport<D>,
+    ) {
+        let time = seen.time;
         let contacts = &simulation.loads.contacts;
         let obstacles = contacts.obstacles.iter().map(|obstacle| obstacle.name.clone());
         touched::see(&mut self.so_far.touched, time, obstacles, &step.obstacles);
@@ -249,29 +269,19 @@ impl<const D: usize> Recorder<D> {
             pairs(simulation).map(|names| names.join(" and ")),
             &step.pairs,
         );
-        let known = self.so_far.watch.warnings.len();
-        self.so_far.watch.see(&seen);
         for (obstacle, contact) in contacts.obstacles.iter().zip(&step.obstacles) {
             let place = format!("in the obstacle {:?}", obstacle.name);
-            self.so_far.watch.see_depth(
-                &seen,
-                &place,
-                "obstacles[].stiffness",
-                contact.depth / simulation.grid.spacing,
-            );
+            self.so_far.watch.see_depth(seen, &place, "obstacles[].stiffness", contact.depth / simulation.grid.spacing);
+            if is_gone(obstacle, &simulation.grid) {
+                self.so_far.watch.see_gone(seen, &obstacle.name);
+            }
         }
         for ([one, other], contact) in pairs(simulation).zip(&step.pairs) {
             let place = format!("in another one ({one:?}, {other:?})");
-            self.so_far.watch.see_depth(&seen, &place, "contact.stiffness", contact.depth / simulation.grid.spacing);
+            self.so_far.watch.see_depth(seen, &place, "contact.stiffness", contact.depth / simulation.grid.spacing);
         }
         let names: Vec<&str> = simulation.bodies.iter().map(|body| body.name.as_str()).collect();
-        self.so_far.watch.see_contact(&seen, &step.sharing, &names);
-        if settings.scheme.follows_path() {
-            self.so_far.watch.see_path(&seen, Point::of(simulation, &self.reference), step.straight);
-        }
-        self.so_far.watch.warnings[known..].iter().for_each(|warning| self.progress.warn(warning));
-        self.progress.show(time, number, &cost, settings.scheme.has_inertia().then_some(energies.balance));
-        Ok(())
+        self.so_far.watch.see_contact(seen, &step.sharing, &names);
     }
 
     /// Writes the last snapshot and the report. The report includes the entries `asked` of the caller, such as the scene and the command
@@ -360,4 +370,12 @@ impl<const D: usize> Recorder<D> {
 fn pairs<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>) -> impl Iterator<Item = [&str; 2]> {
     let pairs = simulation.loads.contacts.between.iter().flat_map(|between| &between.pairs);
     pairs.map(|pair| pair.bodies.map(|body| simulation.bodies[body as usize].name.as_str()))
+}
+
+/// Whether a free obstacle lies outside the grid: a ball about its centre of mass that holds its bounding box.
+fn is_gone<const D: usize>(obstacle: &Obstacle<D>, grid: &Grid<D>) -> bool {
+    let Some(body) = &obstacle.free else { return false };
+    let ((min, max), end) = (obstacle.shape.bounding_box(), grid.position(grid.cells));
+    let radius = (max - body.center).sup(&(body.center - min)).norm();
+    (0..D).any(|k| body.position[k] + radius < grid.origin[k] || body.position[k] - radius > end[k])
 }

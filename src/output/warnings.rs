@@ -51,6 +51,8 @@ pub enum Kind {
     KrylovStagnated,
     /// A body is deep in an obstacle.
     ObstacleDeep,
+    /// A free obstacle has left the grid.
+    ObstacleGone,
     /// Two bodies share nodes and are pulled apart.
     BodiesStick,
     /// The load on the equilibrium path has turned at a limit point.
@@ -214,6 +216,15 @@ impl Watch {
             );
             self.warn(step, Kind::ObstacleDeep, text);
         }
+    }
+
+    /// Warns of a free obstacle outside the grid.
+    pub(crate) fn see_gone(&mut self, step: &Watched, name: &str) {
+        let text = format!(
+            "the free obstacle {name:?} has left the grid, where nothing can touch it. Faces of the grid do not hold obstacles: let it land on a \
+             body, or enlarge the grid"
+        );
+        self.warn(step, Kind::ObstacleGone, text);
     }
 
     /// Examines the bodies that share nodes after a step. Warns of each pair of bodies that sticks together from now on.

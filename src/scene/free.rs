@@ -56,18 +56,18 @@ impl Free {
         gravity: &Vector<f64, D>,
     ) -> Result<RigidBody<D>, BuildError> {
         let grid = grid_around(shape);
-        let points = fill(&grid, shape, FILLING).map_err(|source| BuildError::at(format!("{path}.shape"), source))?;
+        let empty = |_| BuildError::at(format!("{path}.shape"), "the shape is empty: its parts do not meet");
+        let points = fill(&grid, shape, FILLING).map_err(empty)?;
         let volume: f64 = points.iter().map(|point| point.volume).sum();
         let center = points.iter().map(|point| point.position * (point.volume / volume)).sum();
         let inertia = points.iter().map(|point| inertia(point, &center)).sum::<Tensor<f64, 3>>() * self.density;
         let velocity = self.velocity.as_ref().map_or_else(Vector::zeros, |v| vector(v));
         let spin = match self.spin.as_deref() {
-            Some([spin]) => Vector::from([0.0, 0.0, *spin]),
-            Some(spin) => vector(spin),
-            None => Vector::zeros(),
+            Some(&[x, y, z]) => Vector::from([x, y, z]),
+            Some(&[spin]) => Vector::from([0.0, 0.0, spin]),
+            _ => Vector::zeros(),
         };
         let mut body = RigidBody::new(self.density * volume, inertia, center, velocity, spin);
-        body.surface = surface(&grid, shape);
         body.fall_freely(gravity);
         Ok(body)
     }
@@ -88,8 +88,13 @@ fn grid_around<const D: usize>(shape: &Shape<D>) -> Grid<D> {
     Grid { origin: min.add_scalar(-spacing), spacing, cells }
 }
 
-/// A point of the surface in every cell of the grid that the surface cuts.
-fn surface<const D: usize>(grid: &Grid<D>, shape: &Shape<D>) -> Vec<Vector<f64, D>> {
+/// Points on the surface of a shape; none for an unbounded shape.
+pub(super) fn surface<const D: usize>(shape: &Shape<D>) -> Vec<Vector<f64, D>> {
+    let (min, max) = shape.bounding_box();
+    if !min.iter().chain(&max).all(|x| x.is_finite()) {
+        return Vec::new();
+    }
+    let grid = &grid_around(shape);
     let cells = indices(grid.cells.map(u64::from)).map(|cell| cell.map(|i| i as u32));
     let near = |cell: &[u32; D]| {
         let middle = grid.position(*cell).add_scalar(0.5 * grid.spacing);

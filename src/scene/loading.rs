@@ -3,6 +3,7 @@
 use super::body::Body;
 use super::boundary::{Face, Table};
 use super::filling::Builder;
+use super::free::surface;
 use super::load::{Loaded, Pressure, Stress, Traction};
 use super::vector::vector;
 use super::{BuildError, Scene};
@@ -90,6 +91,9 @@ impl<const D: usize> Builder<'_, D> {
             let obstacle = Obstacle::new(one.name.clone(), shape, motion, one.stiffness, one.friction);
             contacts.obstacles.push(Obstacle { free, ..obstacle });
         }
+        if contacts.has_free_obstacle() {
+            contacts.obstacles.iter_mut().for_each(|one| one.surface = surface(&one.shape));
+        }
         if let Some(contact) = &scene.contact {
             let fields = scene.nodal_fields();
             let count = fields.iter().max().map_or(1, |last| u64::from(last + 1));
@@ -132,8 +136,20 @@ impl<const D: usize> Builder<'_, D> {
         bodies.filter(is_around).map(|body| body.name.as_str()).next()
     }
 
-    /// Refuses bodies that start in an obstacle, and free obstacles that start in another obstacle.
-    pub fn refuse_overlap(&self, Contacts { obstacles, .. }: &Contacts<D>) -> Result<(), BuildError> {
+    /// Refuses bodies that start in an obstacle, and a free obstacle and another one that start in each other.
+    pub fn refuse_overlap(&self, contacts: &Contacts<D>) -> Result<(), BuildError> {
+        let obstacles = &contacts.obstacles;
+        let inside = |([_, other], x): &([usize; 2], &Vector<f64, D>)| obstacles[*other].shape.signed_distance(x) < 0.0;
+        if let Some(([one, other], x)) = contacts.apart().find(inside) {
+            let names = [one, other].map(|number| &obstacles[number].name);
+            let what = format!(
+                "the obstacle {:?} starts in the obstacle {:?} at {:?}, and one of them moves freely; move one of the two",
+                names[0],
+                names[1],
+                x.as_slice()
+            );
+            return Err(BuildError::at(format!("obstacles[{one}]"), what));
+        }
         let (particles, h) = (&self.particles, self.grid.spacing);
         for (i, obstacle) in obstacles.iter().enumerate() {
             let depth = |p: usize| -obstacle.shape.signed_distance(&particles.position[p]);
@@ -147,18 +163,6 @@ impl<const D: usize> Builder<'_, D> {
                     obstacle.name
                 );
                 return Err(BuildError::at(format!("obstacles[{i}]"), what));
-            }
-            for other in obstacles.iter().filter(|other| other.name != obstacle.name) {
-                let surface = obstacle.free.iter().flat_map(|body| &body.surface);
-                if let Some(x) = surface.into_iter().find(|x| other.shape.signed_distance(x) < 0.0) {
-                    let what = format!(
-                        "the free obstacle {:?} starts in the obstacle {:?} at {:?}; move one of the two",
-                        obstacle.name,
-                        other.name,
-                        x.as_slice()
-                    );
-                    return Err(BuildError::at(format!("obstacles[{i}].free"), what));
-                }
             }
             if let Some(body) = self.around(&obstacle.shape) {
                 let what = format!("obstacle {:?} starts inside body {body:?}; move one of the two", obstacle.name);

@@ -108,7 +108,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         };
         self.check_entry(&motion.poses, &motion.positions)?;
         self.check_overlap(&motion)?;
-        self.check_meeting(&motion.poses[1])?;
+        self.check_meeting(&motion.poses)?;
         let mut update = ContactUpdate { free, ..self.untouched(&motion) };
         let at_end = points_at(&end, phi, &motion.poses[1]);
         at_end.iter().for_each(|one| update.add_end(one, contacts, &motion));
@@ -127,7 +127,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     }
 
     /// The free obstacles at the end of a step, whose nodes move from `before` to `phi`. Forces are in balance at a part θ of the step.
-    fn free_after(
+    pub(super) fn free_after(
         &self,
         step: &Step<'_, D, L>,
         before: &[Vector<f64, D>],
@@ -149,19 +149,16 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         contacts.obstacles.iter().zip(force.free_motions(&balanced)).map(after).collect()
     }
 
-    /// Refuses a free obstacle in another obstacle: obstacles do not push each other.
-    fn check_meeting(&self, poses: &[Pose<D>]) -> Result<(), StepError> {
-        let obstacles = &self.loads.contacts.obstacles;
-        for (number, one) in obstacles.iter().enumerate() {
-            let surface = one.free.iter().flat_map(|body| &body.surface).map(|point| poses[number].to_space(point));
-            for x in surface {
-                let mut others = obstacles.iter().zip(poses).enumerate().filter(|(other, _)| *other != number);
-                if let Some((_, (other, _))) =
-                    others.find(|(_, (other, pose))| other.shape.signed_distance(&pose.to_frame(&x)) < 0.0)
-                {
-                    let names = [one.name.clone(), other.name.clone()];
-                    return Err(StepError::ObstaclesMeet { names, position: x.iter().copied().collect() });
-                }
+    /// Refuses a step in which a free obstacle and another one enter each other, or go through each other: obstacles do not push each other.
+    fn check_meeting(&self, [start, end]: &[Vec<Pose<D>>; 2]) -> Result<(), StepError> {
+        let (contacts, h) = (&self.loads.contacts, self.grid.spacing);
+        for ([one, other], point) in contacts.apart() {
+            let seen = |poses: &[Pose<D>]| poses[other].to_frame(&poses[one].to_space(point));
+            let (shape, ends) = (&contacts.obstacles[other].shape, [seen(start), seen(end)]);
+            if shape.signed_distance(&ends[1]) < 0.0 || entry(shape, &ends, h).is_some() {
+                let names = [one, other].map(|number| contacts.obstacles[number].name.clone());
+                let position = end[one].to_space(point).iter().copied().collect();
+                return Err(StepError::ObstaclesMeet { names, position });
             }
         }
         Ok(())
@@ -372,9 +369,9 @@ impl<const D: usize> ContactUpdate<D> {
         contact.depth = contact.depth.max(law.depth(y));
     }
 
-    /// Adds a share of the work of a force: half of it at each end of the step, or all of it in the middle. An obstacle moves between the poses at both ends of the
-    /// step, and the point between the `positions`. Friction loses the work along the motion of the point relative to the obstacle or to the
-    /// other body.
+    /// Adds a share of the work of a force in the step: a half for the force at each end, or all for the force in the middle. The point moves
+    /// between its `positions` at both ends. Friction loses the work along the motion of the point relative to the obstacle or to the other
+    /// body.
     fn add_work(
         &mut self,
         share: f64,
@@ -446,8 +443,12 @@ fn free_anchors<const D: usize>(
     if obstacle.friction > 0.0 { positions.iter().map(|x| pose.to_frame(x)).collect() } else { Vec::new() }
 }
 
-/// The middle of the obstacle's bounding box at t = 0; the origin for an unbounded obstacle.
+/// The place that moments on an obstacle are about, in its frame: the centre of mass of a free obstacle, else the middle of its bounding box,
+/// or the origin where there is none.
 fn middle<const D: usize>(obstacle: &Obstacle<D>) -> Vector<f64, D> {
+    if let Some(body) = &obstacle.free {
+        return body.center;
+    }
     let (min, max) = obstacle.shape.bounding_box();
     let middle = (min + max) * 0.5;
     if middle.iter().all(|x| x.is_finite()) { middle } else { Vector::zeros() }

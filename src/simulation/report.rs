@@ -185,9 +185,10 @@ pub enum StepError {
         /// Depth at the end of the step, in grid spacings.
         depth: f64,
     },
-    /// The balance of forces of a free obstacle has no solution that Newton's method finds.
+    /// Newton's method finds no balance of forces on a free obstacle, or the obstacle turns too far.
     #[error(
-        "the forces on the free obstacle {obstacle:?} are not in balance: take shorter steps, or a softer contact (obstacles[].stiffness)"
+        "the forces on the free obstacle {obstacle:?} are not in balance, or it turns by more than half a turn in one step: take shorter \
+         steps, or a softer contact (obstacles[].stiffness)"
     )]
     FreeObstacle {
         /// Name of the obstacle.
@@ -195,7 +196,8 @@ pub enum StepError {
     },
     /// A free obstacle meets another obstacle.
     #[error(
-        "the free obstacle {:?} meets the obstacle {:?} at {position:?}, and obstacles do not push each other: make one of the two a body",
+        "the obstacle {:?} meets the obstacle {:?} at {position:?}, one of them moves freely, and obstacles do not push each other: make one of \
+         the two a body",
         names[0], names[1]
     )]
     ObstaclesMeet {

@@ -4,6 +4,7 @@ use super::contacts::ContactUpdate;
 use super::{Reaction, Simulation, StepError};
 use crate::approximation::ShapeFunction;
 use crate::material::Law;
+use crate::mechanics::loads::Loads;
 use crate::mechanics::residual::Equilibrium;
 use crate::mechanics::schemes::Alphas;
 use crate::mechanics::terms::{self, Role};
@@ -39,30 +40,20 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let (terms::Step { supports, nodal, .. }, phi) = (balanced.step, update.motion());
         let (t, dt) = (self.load(), self.clock.step());
         let mut end = balanced;
-        let after;
+        let (at_end, after);
         if self.settings.scheme.instant() < 1.0 {
-            after = self.equilibrium(supports, nodal, balanced.prescribed, self.settings.scheme.end(dt), t + dt);
+            let ends = self.equilibrium(supports, nodal, balanced.prescribed, self.settings.scheme.end(dt), t + dt);
+            at_end = self.loads_at_end(&balanced.step, phi)?;
+            after = match &at_end {
+                Some(loads) => Equilibrium::new(terms::Step { loads, ..ends.step }, ends.prescribed),
+                None => ends,
+            };
             // The stress at the end is evaluated here for the first time, and fails where det F ≤ 0.
             after.forces(Role::Stores, phi)?;
             end = &after;
         }
-        let (conditions, is_mean) = (&self.loads.prescribed, balanced.step.alphas.discrete_gradient);
-        let mut reactions = vec![Reaction { force: Vector::zeros(), torque: 0.0 }; conditions.len()];
-        let mut work = 0.0;
-        if !end.prescribed.is_empty() {
-            let mut residual: Pooled<Vector<f64, D>> = supports.field();
-            end.residual_into(update.state(), &mut residual)?;
-            for (dof, impulse) in end.prescribed.iter().zip(update.impulses()) {
-                let (reaction, blow) = (residual[dof.node][dof.component], impulse / dt);
-                mutant!("step: reactions and work lack the blow of a wall": blow = 0.0);
-                reactions[dof.owner].force[dof.component] += reaction + blow;
-                if let Some(rotation) = conditions[dof.owner].rotation() {
-                    let x = self.grid.position(self.grid.index(supports.active().ids()[dof.node])) + phi[dof.node];
-                    reactions[dof.owner].torque += rotation.moment(&x, dof.component, reaction + blow);
-                }
-                work += (if is_mean { blow } else { 0.5 * reaction + blow }) * dof.step.increment;
-            }
-        }
+        let is_mean = balanced.step.alphas.discrete_gradient;
+        let (reactions, mut work) = self.reactions(end, update, is_mean)?;
         // At t_n: a = a_n and Δφ = 0.
         let before = supports.pool().collect(nodal.moved(supports.nodes()));
         let start = self.equilibrium(supports, nodal, end.prescribed, Alphas::START, t);
@@ -87,6 +78,55 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let contacts = self.contact_update(&balanced.step, phi)?;
         let (work, dissipated) = (work + contacts.work, dissipated + contacts.friction_loss);
         Ok(Accounts { reactions, work, dissipated, contacts })
+    }
+}
+
+impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
+    /// The reactions at the end of a step, and their part of the work of moving walls: half of the force, or none of it where forces act in the
+    /// middle, and the whole impulse.
+    fn reactions(
+        &self,
+        end: &Equilibrium<'_, D, L>,
+        update: &Update<'_, D>,
+        is_mean: bool,
+    ) -> Result<(Vec<Reaction<D>>, f64), StepError> {
+        let (terms::Step { supports, .. }, phi, dt) = (end.step, update.motion(), self.clock.step());
+        let conditions = &self.loads.prescribed;
+        let mut reactions = vec![Reaction { force: Vector::zeros(), torque: 0.0 }; conditions.len()];
+        let mut work = 0.0;
+        if !end.prescribed.is_empty() {
+            let mut residual: Pooled<Vector<f64, D>> = supports.field();
+            end.residual_into(update.state(), &mut residual)?;
+            for (dof, impulse) in end.prescribed.iter().zip(update.impulses()) {
+                let (reaction, blow) = (residual[dof.node][dof.component], impulse / dt);
+                mutant!("step: reactions and work lack the blow of a wall": blow = 0.0);
+                reactions[dof.owner].force[dof.component] += reaction + blow;
+                if let Some(rotation) = conditions[dof.owner].rotation() {
+                    let x = self.grid.position(self.grid.index(supports.active().ids()[dof.node])) + phi[dof.node];
+                    reactions[dof.owner].torque += rotation.moment(&x, dof.component, reaction + blow);
+                }
+                work += (if is_mean { blow } else { 0.5 * reaction + blow }) * dof.step.increment;
+            }
+        }
+        Ok((reactions, work))
+    }
+
+    /// The loads with all free obstacles held where they are at the end of a step; `None` if no obstacle moves freely.
+    fn loads_at_end(
+        &self,
+        step: &terms::Step<'_, D, L>,
+        phi: &[Vector<f64, D>],
+    ) -> Result<Option<Loads<D>>, StepError> {
+        if !self.loads.contacts.has_free_obstacle() {
+            return Ok(None);
+        }
+        let before: Vec<_> = step.nodal.moved(step.supports.nodes()).collect();
+        let mut loads = self.loads.clone();
+        for (obstacle, body) in loads.contacts.obstacles.iter_mut().zip(self.free_after(step, &before, phi)?) {
+            obstacle.held = body.map(|body| body.pose(&Vector::zeros()));
+            obstacle.free = None;
+        }
+        Ok(Some(loads))
     }
 }
 

@@ -1,7 +1,10 @@
 //! Obstacles that move freely, in whole runs: momentum is kept, tangents are exact, and wrong scenes are refused.
 
-use crate::support::{Failure, advance, assert_refused, built, in_threads, merged, restored, run_to, solid, with};
+use crate::support::{
+    Failure, advance, assert_refused, built, in_threads, merged, output, restored, run_to, solid, with,
+};
 use bfree::mechanics::loads::RigidBody;
+use bfree::output::{Outcome, Recorder, Reference};
 use bfree::simulation::Simulation;
 use bfree::tensor::Vector;
 use serde_json::{Value, json};
@@ -131,7 +134,81 @@ fn a_free_obstacle_that_meets_another_one_ends_the_run() -> Result<(), Failure> 
     // From the start, this is an error of the scene.
     scene["obstacles"][1]["shape"]["box"]["min"] = json!([0, 2]);
     let text = built::<2>(&scene).err().map(|error| error.to_string()).unwrap_or_default();
-    assert!(text.contains("obstacles[0].free") && text.contains("starts in the obstacle \"wall\""), "{text}");
+    assert!(text.contains("obstacles[0]") && text.contains("starts in the obstacle \"wall\""), "{text}");
+    Ok(())
+}
+
+#[test]
+fn a_pin_in_a_free_disc_is_found() -> Result<(), Failure> {
+    // No point of the disc's surface lies in the pin.
+    let pin = json!({ "name": "pin", "shape": { "ball": { "center": [1.1, 1.3], "radius": 0.01 } } });
+    let mut scene = flying();
+    scene["obstacles"].as_array_mut().ok_or("no list")?.push(pin);
+    let text = built::<2>(&scene).err().map(|error| error.to_string()).unwrap_or_default();
+    assert!(text.contains("obstacles[1]") && text.contains("\"pin\" starts in the obstacle \"disc\""), "{text}");
+    Ok(())
+}
+
+#[test]
+fn a_free_obstacle_does_not_pass_a_thin_one_silently() -> Result<(), Failure> {
+    // Per step the disc moves by more than its own size.
+    let plate = json!({ "name": "plate", "shape": { "box": { "min": [0.2, 2.8], "max": [1, 2.81] } } });
+    let changes = [
+        ("/obstacles/0/free/velocity", json!([0, 200])),
+        ("/obstacles/0/shape/ball", json!({ "center": [0.6, 2.4], "radius": 0.3 })),
+    ];
+    let mut scene = with(flying(), &changes);
+    scene["obstacles"].as_array_mut().ok_or("no list")?.push(plate);
+    let mut simulation: Simulation<2> = built(&scene)?;
+    let error = simulation.advance().err().ok_or("the disc passed")?;
+    assert!(error.cause.to_string().contains("\"disc\" meets the obstacle \"plate\""), "{}", error.cause);
+    Ok(())
+}
+
+#[test]
+fn a_free_obstacle_far_away_does_not_accelerate_a_body() -> Result<(), Failure> {
+    // The slab lies where the obstacle would be if its acceleration were a displacement.
+    let scene = json!({
+        "grid": { "size": [4, 14], "spacing": 0.5 },
+        "time": { "step": 0.01, "end": 1 },
+        "gravity": { "acceleration": [0, -10] },
+        "bodies": [solid("slab", 1000, json!({ "box": { "min": [1, 11], "max": [3, 11.5] } }))],
+        "obstacles": [{ "name": "ball", "shape": { "ball": { "center": [2, 2], "radius": 0.8 } }, "free": { "density": 1 } }]
+    });
+    let mut simulation: Simulation<2> = built(&scene)?;
+    simulation.advance()?;
+    let fallen = simulation.particles.momentum()[1] / simulation.particles.mass.iter().sum::<f64>();
+    assert!((fallen + 0.1).abs() < 1e-12, "{fallen}");
+    Ok(())
+}
+
+#[test]
+fn a_free_obstacle_that_leaves_the_grid_is_told() -> Result<(), Failure> {
+    let scene = with(flying(), &[("/obstacles/0/free/velocity", json!([-20, 0])), ("/time/end", json!(0.2))]);
+    let folder = tempfile::tempdir()?;
+    let mut simulation: Simulation<2> = built(&scene)?;
+    let mut recorder = Recorder::start(output(folder.path()), &simulation, Reference::of(&simulation))?;
+    for _ in 0..30 {
+        let step = simulation.advance()?;
+        recorder.record(&simulation, &step)?;
+    }
+    recorder.finish(&simulation, &serde_json::Map::new(), Outcome::Finished)?;
+    let report = std::fs::read_to_string(folder.path().join("report.json"))?;
+    assert!(report.contains("obstacle_gone") && report.contains("has left the grid"), "{report}");
+    Ok(())
+}
+
+#[test]
+fn in_one_dimension_nothing_spins() -> Result<(), Failure> {
+    let scene = json!({
+        "grid": { "size": [4], "spacing": 0.25 },
+        "time": { "step": 0.01, "end": 1 },
+        "bodies": [solid("bar", 100, json!({ "box": { "min": [0.5], "max": [1.5] } }))],
+        "obstacles": [{ "name": "mass", "shape": { "box": { "min": [2], "max": [2.5] } }, "free": { "density": 1, "velocity": [-1], "spin": [] } }]
+    });
+    let mut simulation: Simulation<1> = built(&scene)?;
+    advance(&mut simulation, 3)?;
+    assert!((free(&simulation)?.position[0] - 2.22).abs() < 1e-12);
     Ok(())
 }
 

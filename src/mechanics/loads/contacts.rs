@@ -80,6 +80,18 @@ impl<const D: usize> Contacts<D> {
         self.obstacles.iter().any(|obstacle| obstacle.free.is_some())
     }
 
+    /// The points of the surfaces of obstacles that must not meet: the numbers of the obstacle and of the other one, and the point in the
+    /// frame of the first. One of the two moves freely.
+    pub(crate) fn apart(&self) -> impl Iterator<Item = ([usize; 2], &Vector<f64, D>)> {
+        let all = self.obstacles.iter().enumerate();
+        all.flat_map(move |(one, obstacle)| {
+            let others = self.obstacles.iter().enumerate();
+            let others = others
+                .filter(move |(other, second)| *other != one && (obstacle.free.is_some() || second.free.is_some()));
+            others.flat_map(move |(other, _)| obstacle.surface.iter().map(move |point| ([one, other], point)))
+        })
+    }
+
     /// Whether friction acts anywhere.
     pub fn have_friction(&self) -> bool {
         let between = self.between.iter().map(|between| between.friction);

@@ -17,6 +17,10 @@ pub struct Obstacle<const D: usize> {
     pub motion: [Option<Motion<D>>; D],
     /// The mass and the state of an obstacle that moves freely; `None` if its motion is prescribed.
     pub free: Option<RigidBody<D>>,
+    /// A pose that the obstacle keeps at all times, in place of its motion.
+    pub held: Option<Pose<D>>,
+    /// Points of the surface, in the frame of the obstacle, where obstacles move freely. There obstacles must not meet.
+    pub surface: Vec<Vector<f64, D>>,
     /// The penalty stiffness (pressure per depth) in units of min(Λ + 2G, 4G)/h of the body, > 0.
     pub stiffness: f64,
     /// The coefficient of friction μ, ≥ 0.
@@ -61,8 +65,8 @@ impl<const D: usize> Obstacle<D> {
             let of = |i: usize| self.motion[i].as_ref().map_or(0.0, |motion| motion.over(0.0, t, x, i).increment);
             Vector::<f64, D>::from_fn(|i, _| of(i))
         };
-        if let Some(body) = &self.free {
-            return body.pose(&Vector::zeros());
+        if let Some(pose) = self.held.or(self.free.as_ref().map(|body| body.pose(&Vector::zeros()))) {
+            return pose;
         }
         mutant!("obstacle: it rests": { return Pose { rotation: identity(), shift: Vector::zeros() }; });
         let shift = moved(&Vector::zeros());
@@ -83,8 +87,10 @@ impl<const D: usize> Obstacle<D> {
         friction: f64,
     ) -> Self {
         let name = name.into();
-        let free = None;
-        Self { name, shape, motion, free, stiffness, friction, anchors: Vec::new(), work: 0.0, friction_loss: 0.0 }
+        let (surface, anchors) = (Vec::new(), Vec::new());
+        let (work, friction_loss) = (0.0, 0.0);
+        let (free, held) = (None, None);
+        Self { name, shape, motion, free, held, surface, stiffness, friction, anchors, work, friction_loss }
     }
 
     /// Whether the obstacle moves at any time.

@@ -8,9 +8,9 @@ use crate::tensor::{Tensor, Vector, identity, outer};
 /// A rigid body with mass. Its motion in a step is q = (d, Θ): the translation d of its centre of mass, and a rotation vector Θ in the frame
 /// of the body. In 2D only d and Θ₃ are in use, in 1D only d.
 ///
-/// R = R_n cay Θ,  cay Θ = (I − ½ Θ̂)⁻¹ (I + ½ Θ̂)
+/// R = R_n exp Θ̂
 ///
-/// Θ has the length 2 tan(ϑ/2) for an angle ϑ. The time integration scheme relates q, the velocity (v, W) and the acceleration (a, A). W and
+/// A steady turn about one axis is exact for every step length. The time integration scheme relates q, the velocity (v, W) and the acceleration (a, A). W and
 /// A are the angular velocity and acceleration in the frame of the body.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RigidBody<const D: usize> {
@@ -20,8 +20,6 @@ pub struct RigidBody<const D: usize> {
     pub inertia: Tensor<f64, 3>,
     /// The centre of mass in the frame of the body.
     pub center: Vector<f64, D>,
-    /// Points of its surface, in the frame of the body. There it must not meet other obstacles.
-    pub surface: Vec<Vector<f64, D>>,
     /// The centre of mass at t_n.
     pub position: Vector<f64, D>,
     /// R_n
@@ -72,17 +70,22 @@ pub(crate) fn in_space<T: Real, const D: usize>(a: &Vector<T, D>) -> Vector<T, 3
     Vector::from_fn(|i, _| if i < D { a[i] } else { T::zero() })
 }
 
-/// 1/(1 + ¼ |Θ|²)
-fn shrink<T: Real>(turn: &Vector<T, 3>) -> T {
-    (T::one() + turn.dot(turn) * T::lit(0.25)).recip()
+/// Terms of the series. They are exact to round-off up to a turn of π.
+const TERMS: u32 = 16;
+
+/// Σ (−s)ᵏ/(2k + n)!, which is sin √s/√s for n = 1, (1 − cos √s)/s for n = 2, and (√s − sin √s)/√s³ for n = 3. The series has all derivatives
+/// at s = 0.
+fn series<T: Real>(s: T, n: u32) -> T {
+    let factorial = |k: u32| (1..=k).map(f64::from).product::<f64>();
+    (0..TERMS).rev().fold(T::zero(), |sum, k| T::lit(factorial(2 * k + n).recip()) - s * sum)
 }
 
-/// cay Θ = I + (Θ̂ + ½ Θ̂²)/(1 + ¼ |Θ|²)
-fn cayley<T: Real>(turn: &Vector<T, 3>) -> Tensor<T, 3> {
-    let (hat, half) = (skew(turn), T::lit(0.5));
+/// I + f_n Θ̂ + f_{n+1} Θ̂² with the functions f of [`series`] at |Θ|². It is exp Θ̂ for n = 1, and ∂φ/∂Θ of exp Θ̂ for n = 2.
+fn of_turn<T: Real>(turn: &Vector<T, 3>, n: u32) -> Tensor<T, 3> {
+    let s = turn.dot(turn);
     // Θ̂² = Θ ⊗ Θ − |Θ|² I
-    let square = outer(turn, turn) - identity::<T, 3>() * turn.dot(turn);
-    identity::<T, 3>() + (hat + square * half) * shrink(turn)
+    let square = outer(turn, turn) - identity::<T, 3>() * s;
+    identity::<T, 3>() + skew(turn) * series(s, n) + square * series(s, n + 1)
 }
 
 impl<const D: usize> RigidBody<D> {
@@ -92,11 +95,11 @@ impl<const D: usize> RigidBody<D> {
     /// use bfree::mechanics::loads::RigidBody;
     /// use bfree::tensor::{Vector, identity};
     ///
-    /// // A disc that turns by a quarter: Θ₃ = 2 tan(π/8).
+    /// // A disc that turns by a quarter.
     /// let (center, spin) = (Vector::from([2.0, 1.0]), Vector::from([0.0, 0.0, 3.0]));
     /// let disc = RigidBody::new(5.0, identity::<f64, 3>() * 0.1, center, Vector::zeros(), spin);
     /// let mut q = Vector::zeros();
-    /// q[5] = 2.0 * std::f64::consts::FRAC_PI_8.tan();
+    /// q[5] = std::f64::consts::FRAC_PI_2;
     /// let right = disc.pose(&q).to_space(&Vector::from([3.0, 1.0]));
     /// assert!((right - Vector::from([2.0, 2.0])).norm() < 1e-15);
     /// assert_eq!(disc.kinetic_energy(), 0.5 * 0.1 * 9.0);
@@ -109,8 +112,8 @@ impl<const D: usize> RigidBody<D> {
         spin: Vector<f64, 3>,
     ) -> Self {
         let velocity = stacked(&in_space(&velocity), &spin);
-        let (rotation, acceleration, surface) = (identity(), Vector::zeros(), Vec::new());
-        Self { mass, inertia, center, surface, position: center, rotation, velocity, acceleration }
+        let (rotation, acceleration) = (identity(), Vector::zeros());
+        Self { mass, inertia, center, position: center, rotation, velocity, acceleration }
     }
 
     /// Sets the acceleration to that without contact.
@@ -125,7 +128,7 @@ impl<const D: usize> RigidBody<D> {
 
     /// R after the motion q since t_n.
     pub(crate) fn turned<T: Real>(&self, q: &Vector<T, 6>) -> Tensor<T, 3> {
-        self.rotation.map(T::lit) * cayley(&turn(q))
+        self.rotation.map(T::lit) * of_turn(&turn(q), 1)
     }
 
     /// The centre of mass after the motion q since t_n.
@@ -140,10 +143,9 @@ impl<const D: usize> RigidBody<D> {
         Pose { rotation, shift: self.moved(q) - rotation * self.center.map(T::lit) }
     }
 
-    /// P with δφ = P δΘ, the rotation of space that a change of Θ causes: P = R_n (I + ½ Θ̂)/(1 + ¼ |Θ|²).
+    /// P with δφ = P δΘ, the rotation of space that a change of Θ causes.
     pub(crate) fn turning(&self, q: &Vector<f64, 6>) -> Tensor<f64, 3> {
-        let turn = turn(q);
-        self.rotation * (identity::<f64, 3>() + skew(&turn) * 0.5) * shrink(&turn)
+        self.rotation * of_turn(&turn(q), 2)
     }
 
     /// The force of inertia m a, and its moment J A + W × J W in the frame of the body.
@@ -223,7 +225,7 @@ mod tests {
         let inertia = Tensor::<f64, 3>::new(3.0, 0.4, 0.1, 0.4, 2.0, -0.2, 0.1, -0.2, 1.0);
         let (center, velocity) = (Vector::from([0.5, -0.2, 0.1]), Vector::from([1.0, 2.0, -1.0]));
         let mut body = RigidBody::new(4.0, inertia, center, velocity, Vector::from([0.3, -0.7, 1.1]));
-        body.rotation = cayley(&Vector::from([0.4, 0.8, -0.5]));
+        body.rotation = of_turn(&Vector::from([0.4, 0.8, -0.5]), 1);
         body.fall_freely(&Vector::from([0.0, -1.0, 0.0]));
         body
     }
@@ -233,6 +235,8 @@ mod tests {
         let (body, alphas) = (turning(), Newmark::default().alphas(0.1));
         let q = Vector::<f64, 6>::from([0.2, -0.1, 0.4, 0.3, -0.6, 0.9]);
         let pose = body.pose(&q);
+        let half_turn = of_turn(&Vector::from([0.0, 0.0, std::f64::consts::PI]), 1);
+        assert!((half_turn - Tensor::from_diagonal(&Vector::from([-1.0, -1.0, 1.0]))).norm() < 1e-14);
         assert!((pose.rotation.transpose() * pose.rotation - identity::<f64, 3>()).norm() < 1e-15);
         for k in 0..6 {
             let mut along = q.map(Dual64::from);

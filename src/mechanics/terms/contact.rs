@@ -137,7 +137,7 @@ impl<const D: usize, L: Law> Term<D> for ContactForce<'_, D, L> {
         }
     }
 
-    /// Σ ½ k g² A. Free obstacles have inertia, and a potential only in the plane.
+    /// Σ ½ k g² A. Free obstacles bring their inertia into the balance, which in space has no potential.
     fn energy<T: Number>(&self, dphi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>> {
         let energy = |one: ContactPoint<T, D>| one.law.energy(&one.y) * T::lit(one.area);
         let has_potential = self.response == Response::Pressure && !self.step.loads.contacts.has_free_obstacle();
