@@ -6,7 +6,6 @@ pub mod constitutive;
 pub(crate) mod contact;
 pub(crate) mod dilatation;
 pub(crate) mod facing;
-pub(crate) mod free_obstacle;
 mod joined_cells;
 pub mod loads;
 mod local_form;

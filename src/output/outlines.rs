@@ -7,7 +7,7 @@ use crate::mechanics::loads::{Contacts, Obstacle};
 use crate::shape::GridBox;
 use crate::tensor::Vector;
 
-/// Cells along the longest edge of an obstacle, in 1D, 2D and 3D. Larger cells than those of the grid are not needed.
+/// The largest number of cells along the longest edge of an obstacle, in 1D, 2D and 3D. No cell is smaller than a cell of the grid.
 const CELLS: [f64; 3] = [64.0, 64.0, 24.0];
 
 /// The largest distance between a surface and its simplices, relative to a cell, in 1D, 2D and 3D.
@@ -47,7 +47,7 @@ fn outline<const D: usize>(obstacle: &Obstacle<D>, grid: &Grid<D>) -> Vec<Vector
     let count: [u64; D] = std::array::from_fn(|k| ((max[k] - min[k]) / edge).ceil().max(0.0) as u64 + 2);
     let mut corners = Vec::new();
     for cell in indices(count) {
-        // Faces of the shape do not lie on faces of cells.
+        // The cells begin off the faces of the shape: a face between two cells would be drawn twice, or not at all.
         let lower = Vector::<f64, D>::from_fn(|k, _| min[k] + edge * (cell[k] as f64 - 0.9));
         let of = GridBox { lower, edges: Vector::repeat(edge), spacing: edge };
         if obstacle.shape.signed_distance(&lower.add_scalar(0.5 * edge)).abs() <= edge * (D as f64).sqrt() {

@@ -17,9 +17,8 @@ use super::warnings::Watched;
 use super::{OutputError, Reference, Summary};
 use crate::approximation::ShapeFunction;
 use crate::field::Field;
-use crate::grid::Grid;
 use crate::material::Law;
-use crate::mechanics::loads::{Obstacle, Reaction};
+use crate::mechanics::loads::Reaction;
 use crate::simulation::{ContactForces, Simulation, StepReport};
 use serde_json::{Map, Value};
 use std::path::PathBuf;
@@ -272,7 +271,7 @@ impl<const D: usize> Recorder<D> {
         for (obstacle, contact) in contacts.obstacles.iter().zip(&step.obstacles) {
             let place = format!("in the obstacle {:?}", obstacle.name);
             self.so_far.watch.see_depth(seen, &place, "obstacles[].stiffness", contact.depth / simulation.grid.spacing);
-            if is_gone(obstacle, &simulation.grid) {
+            if obstacle.has_left(&simulation.grid) {
                 self.so_far.watch.see_gone(seen, &obstacle.name);
             }
         }
@@ -370,12 +369,4 @@ impl<const D: usize> Recorder<D> {
 fn pairs<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>) -> impl Iterator<Item = [&str; 2]> {
     let pairs = simulation.loads.contacts.between.iter().flat_map(|between| &between.pairs);
     pairs.map(|pair| pair.bodies.map(|body| simulation.bodies[body as usize].name.as_str()))
-}
-
-/// Whether a free obstacle lies outside the grid: a ball about its centre of mass that holds its bounding box.
-fn is_gone<const D: usize>(obstacle: &Obstacle<D>, grid: &Grid<D>) -> bool {
-    let Some(body) = &obstacle.free else { return false };
-    let ((min, max), end) = (obstacle.shape.bounding_box(), grid.position(grid.cells));
-    let radius = (max - body.center).sup(&(body.center - min)).norm();
-    (0..D).any(|k| body.position[k] + radius < grid.origin[k] || body.position[k] - radius > end[k])
 }

@@ -132,9 +132,7 @@ impl<const D: usize> Snapshots<D> {
         self.mark.last = Some(step);
         Ok(())
     }
-}
 
-impl<const D: usize> Snapshots<D> {
     /// Writes a file, and its entry in a series.
     fn add(&mut self, which: usize, series: &str, snapshot: &Snapshot, file: &str) -> Result<(), OutputError> {
         snapshot.write(&self.directory.join(file))?;

@@ -25,7 +25,7 @@ pub struct Free {
     pub spin: Option<Vec<f64>>,
 }
 
-/// Cells along the longest edge of the obstacle, in 1D, 2D and 3D. Their points integrate volume, centre of mass and inertia.
+/// Cells along the longest edge of the obstacle, in 1D, 2D and 3D. Their quadrature points give volume, centre of mass and inertia.
 const CELLS: [f64; 3] = [32.0, 32.0, 8.0];
 
 /// The quadrature of volumes and second moments.
@@ -73,7 +73,7 @@ impl Free {
     }
 }
 
-/// J of a point about the centre: (|r|² I − r ⊗ r) V. In 2D and 1D, a length of one in z counts without its extent.
+/// J of a point about the centre: (|r|² I − r ⊗ r) V. In 1D and 2D, the extent of the obstacle along the missing axes does not count.
 fn inertia<const D: usize>(point: &Seed<D>, center: &Vector<f64, D>) -> Tensor<f64, 3> {
     let arm = point.position - center;
     let arm = Vector::<f64, 3>::from_fn(|i, _| if i < D { arm[i] } else { 0.0 });

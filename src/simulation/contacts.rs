@@ -1,26 +1,18 @@
-//! Contact with obstacles and between bodies at the end of a step: forces, work, friction loss, and the new state of friction.
+//! Contact with obstacles and between bodies at the end of a step: forces, work, friction loss, and the new states of friction and of free
+//! obstacles.
 
 use super::work::halfway;
 use super::{Simulation, StepError};
 use crate::approximation::ShapeFunction;
 use crate::material::Law;
-use crate::mechanics::contact::{Carrier, ContactPoint, Response, Surroundings, Touching, obstacle_points};
-use crate::mechanics::facing::{DEEPEST, Overlap, REACH, facing, overlaps};
-use crate::mechanics::free_obstacle::FreeMotion;
+use crate::mechanics::contact::{Carrier, ContactPoint, FreeMotion, Response, Surroundings, Touching, obstacle_points};
+use crate::mechanics::facing::facing;
 use crate::mechanics::loads::{Contacts, Facing, Obstacle, Pose, RigidBody};
 use crate::mechanics::schemes::Alphas;
 use crate::mechanics::terms::{ContactForce, Step, penalties};
-use crate::shape::Shape;
 use crate::tensor::Vector;
 use nalgebra::Vector3;
 use std::collections::HashMap;
-
-/// A point may enter an obstacle or another body in one step by this many spacings at most. A longer step is repeated with half its length.
-const DEEPEST_ENTRY: f64 = 0.25;
-
-/// The path of a point in a step is tested for obstacles at places this far apart, in spacings, and at this many places at most.
-const SAMPLED: f64 = 0.05;
-const MOST_SAMPLES: f64 = 1000.0;
 
 /// The contact of all bodies with one obstacle, or of a pair of bodies, at the end of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,15 +71,17 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         self.loads.contacts.between = Some(between);
     }
 
-    /// The contact at the end of a step, with the nodal motion `phi` since the last grid reset.
+    /// The contact at the end of a step whose nodes move from `before` to `phi` since the last grid reset, with the free obstacles and the
+    /// poses of all obstacles there.
     ///
     /// # Errors
-    /// A point enters an obstacle or another body too deeply, or goes through it. A free obstacle meets another obstacle, or has no balance of
-    /// forces.
+    /// A point enters an obstacle or another body too deeply, or goes through it. A free obstacle meets another obstacle.
     pub(super) fn contact_update(
         &self,
         step: &Step<'_, D, L>,
-        phi: &[Vector<f64, D>],
+        [before, phi]: [&[Vector<f64, D>]; 2],
+        free: Vec<Option<RigidBody<D>>>,
+        poses: Vec<Pose<D>>,
     ) -> Result<ContactUpdate<D>, StepError> {
         let contacts = &self.loads.contacts;
         if !contacts.exist() {
@@ -96,19 +90,12 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         // Forces at both ends are those of an instant.
         let alphas = Alphas { discrete_gradient: false, ..step.alphas };
         let end = Step { time: self.load() + self.clock.step(), alphas, ..*step };
-        let before: Vec<_> = step.nodal.moved(step.supports.nodes()).collect();
-        let free = self.free_after(step, &before, phi)?;
-        let after = |(pose, body): (Pose<D>, &Option<RigidBody<D>>)| {
-            body.as_ref().map_or(pose, |body| body.pose(&Vector::zeros()))
-        };
         let motion = Motion {
-            poses: [self.poses(self.load()), self.poses(end.time).into_iter().zip(&free).map(after).collect()],
+            poses: [self.poses(self.load()), poses],
             positions: self.point_positions(step, phi),
             relative: self.relative_motions(step, phi),
         };
-        self.check_entry(&motion.poses, &motion.positions)?;
-        self.check_overlap(&motion)?;
-        self.check_meeting(&motion.poses)?;
+        self.check_paths(&motion)?;
         let mut update = ContactUpdate { free, ..self.untouched(&motion) };
         let at_end = points_at(&end, phi, &motion.poses[1]);
         at_end.iter().for_each(|one| update.add_end(one, contacts, &motion));
@@ -116,17 +103,21 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             points.iter().for_each(|one| update.add_work(share, one, &motion, &self.ends(one, &motion.positions)));
         };
         if step.alphas.discrete_gradient {
-            work(1.0, &points_at(step, &halfway(&before, phi), &self.poses(step.time)));
+            work(1.0, &points_at(step, &halfway(before, phi), &self.poses(step.time)));
             return Ok(update);
         }
         work(0.5, &at_end);
         let start = Step { time: self.load(), ..end };
         mutant!("obstacles: the forces at the start of a step do no work": { return Ok(update); });
-        work(0.5, &points_at(&start, &before, &motion.poses[0]));
+        work(0.5, &points_at(&start, before, &motion.poses[0]));
         Ok(update)
     }
 
-    /// The free obstacles at the end of a step, whose nodes move from `before` to `phi`. Forces are in balance at a part θ of the step.
+    /// The free obstacles at the end of a step whose nodes move from `before` to `phi`. Forces are in balance at a part θ of the step.
+    ///
+    /// # Errors
+    /// Newton's method finds no balance of forces on an obstacle, or the obstacle turns by more than half a turn. The bodies' equations have
+    /// then used wrong forces.
     pub(super) fn free_after(
         &self,
         step: &Step<'_, D, L>,
@@ -135,33 +126,23 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     ) -> Result<Vec<Option<RigidBody<D>>>, StepError> {
         let (contacts, scheme) = (&self.loads.contacts, &self.settings.scheme);
         let force = ContactForce::pressure(step).filter(|_| contacts.has_free_obstacle());
-        let Some(force) = force else { return Ok(contacts.obstacles.iter().map(|_| None).collect()) };
+        let Some(force) = force else { return Ok(vec![None; contacts.obstacles.len()]) };
         let (theta, end) = (scheme.instant(), scheme.end(self.clock.step()));
         let balanced: Vec<_> = before.iter().zip(phi).map(|(before, phi)| before + (phi - before) * theta).collect();
         let after = |(obstacle, motion): (&Obstacle<D>, Option<FreeMotion>)| {
             let (Some(body), Some(motion)) = (&obstacle.free, motion) else { return Ok(None) };
-            // Newton's method of the bodies has used forces that are wrong if they are not in balance on the obstacle.
-            let refused = StepError::FreeObstacle { obstacle: obstacle.name.clone() };
-            let q = motion.q / theta;
-            mutant!("free obstacles: they stay where forces are in balance": q = motion.q);
-            if motion.is_balanced { Ok(Some(body.after(&q, &end))) } else { Err(refused) }
+            let refused = || StepError::FreeObstacle { obstacle: obstacle.name.clone() };
+            Ok(Some(body.after(&motion.whole(theta).ok_or_else(refused)?, &end)))
         };
         contacts.obstacles.iter().zip(force.free_motions(&balanced)).map(after).collect()
     }
 
-    /// Refuses a step in which a free obstacle and another one enter each other, or go through each other: obstacles do not push each other.
-    fn check_meeting(&self, [start, end]: &[Vec<Pose<D>>; 2]) -> Result<(), StepError> {
-        let (contacts, h) = (&self.loads.contacts, self.grid.spacing);
-        for ([one, other], point) in contacts.apart() {
-            let seen = |poses: &[Pose<D>]| poses[other].to_frame(&poses[one].to_space(point));
-            let (shape, ends) = (&contacts.obstacles[other].shape, [seen(start), seen(end)]);
-            if shape.signed_distance(&ends[1]) < 0.0 || entry(shape, &ends, h).is_some() {
-                let names = [one, other].map(|number| contacts.obstacles[number].name.clone());
-                let position = end[one].to_space(point).iter().copied().collect();
-                return Err(StepError::ObstaclesMeet { names, position });
-            }
-        }
-        Ok(())
+    /// The poses of all obstacles at the time of the end of a step, with the free ones there.
+    pub(super) fn poses_after(&self, free: &[Option<RigidBody<D>>], end: f64) -> Vec<Pose<D>> {
+        let pose = |(pose, body): (Pose<D>, &Option<RigidBody<D>>)| {
+            body.as_ref().map_or(pose, |body| body.pose(&Vector::zeros()))
+        };
+        self.poses(end).into_iter().zip(free).map(pose).collect()
     }
 
     /// The update of a step in which nothing touches.
@@ -191,68 +172,6 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         facing.map(of).collect()
     }
 
-    /// Refuses a step in which a point enters another body too deeply, or in which a body may have gone through another one.
-    fn check_overlap(&self, motion: &Motion<D>) -> Result<(), StepError> {
-        let contacts = &self.loads.contacts;
-        let Some(between) = &contacts.between else { return Ok(()) };
-        let h = self.grid.spacing;
-        let body_of = |number: usize| self.particles.body[contacts.points[number].particle];
-        let start = |number: usize| self.particles.position[contacts.points[number].particle];
-        let refused = |number: usize, pair: usize, depth: f64| {
-            let own = body_of(number);
-            let other = between.pairs[pair].bodies.into_iter().find(|&body| body != own).unwrap_or(own);
-            let names = [own, other].map(|body| self.bodies[body as usize].name.clone());
-            StepError::EntersBody { bodies: names, position: start(number).iter().copied().collect(), depth }
-        };
-        let depth = |one: &Facing<D>, relative: &Vector<f64, D>| -one.normal.dot(relative) / h;
-        let before: HashMap<usize, f64> =
-            between.facing.iter().map(|one| (one.number, depth(one, &one.start).max(0.0))).collect();
-        let known = between.facing.iter().map(|one| {
-            let depth = depth(one, &motion.relative[&one.number][1]);
-            (one.number, one.pair, depth)
-        });
-        // A point may have come around an edge, or along a curved surface.
-        let ends = overlaps(contacts, between, &self.particles, &self.grid, &motion.positions);
-        mutant!("contact: a point that did not face a body may enter it": ends = Vec::new());
-        let new = ends.iter().map(|&Overlap { number, pair, depth }| (number, pair, depth / h));
-        for (number, pair, depth) in known.chain(new) {
-            let entered = depth - before.get(&number).copied().unwrap_or(0.0);
-            if depth > DEEPEST || entered > DEEPEST_ENTRY {
-                return Err(refused(number, pair, depth));
-            }
-        }
-        // The search has seen what is within its reach, so nothing may come from farther away.
-        let boxes = self.boxes(&motion.positions);
-        for pair in &between.pairs {
-            let [Some(one), Some(other)] = pair.bodies.map(|body| boxes[body as usize]) else { continue };
-            let meet = (0..D).all(|k| one.low[k] <= other.high[k] && other.low[k] <= one.high[k]);
-            let apart = one.motion - other.motion;
-            if meet && apart.norm() + one.spread + other.spread > f64::from(REACH) * h {
-                let bodies = pair.bodies.map(|body| self.bodies[body as usize].name.clone());
-                return Err(StepError::PassesBody { bodies, reach: REACH });
-            }
-        }
-        Ok(())
-    }
-
-    /// The boxes through which the surfaces of all bodies move in the step; `None` for a body without surface points.
-    fn boxes(&self, positions: &[Vector<f64, D>]) -> Vec<Option<Swept<D>>> {
-        let mut boxes: Vec<Option<Swept<D>>> = vec![None; self.bodies.len()];
-        for (point, end) in self.loads.contacts.points.iter().zip(positions) {
-            let start = &self.particles.position[point.particle];
-            let (low, high, motion) = (start.inf(end), start.sup(end), end - start);
-            let swept = boxes[self.particles.body[point.particle] as usize];
-            let new = Swept { low, high, motion, spread: 0.0 };
-            boxes[self.particles.body[point.particle] as usize] = Some(swept.map_or(new, |swept| Swept {
-                low: swept.low.inf(&low),
-                high: swept.high.sup(&high),
-                motion: swept.motion,
-                spread: swept.spread.max((motion - swept.motion).norm()),
-            }));
-        }
-        boxes
-    }
-
     /// The positions of all points at the end of the step.
     fn point_positions(&self, step: &Step<'_, D, L>, phi: &[Vector<f64, D>]) -> Vec<Vector<f64, D>> {
         let reference = self.particles.reference().position;
@@ -268,23 +187,6 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// The poses of all obstacles at a time.
     fn poses(&self, time: f64) -> Vec<Pose<D>> {
         self.loads.contacts.obstacles.iter().map(|one| one.pose(time)).collect()
-    }
-
-    /// Refuses a step in which a point enters an obstacle too deeply, or goes through an obstacle.
-    fn check_entry(&self, poses: &[Vec<Pose<D>>; 2], positions: &[Vector<f64, D>]) -> Result<(), StepError> {
-        let (contacts, h) = (&self.loads.contacts, self.grid.spacing);
-        mutant!("obstacles: a point may enter deeply in one step": { return Ok(()); });
-        for (point, end) in contacts.points.iter().zip(positions) {
-            let start = &self.particles.position[point.particle];
-            for (number, obstacle) in contacts.obstacles.iter().enumerate() {
-                let ends = [poses[0][number].to_frame(start), poses[1][number].to_frame(end)];
-                if let Some(depth) = entry(&obstacle.shape, &ends, h) {
-                    let position = start.iter().copied().collect();
-                    return Err(StepError::EntersObstacle { obstacle: obstacle.name.clone(), position, depth });
-                }
-            }
-        }
-        Ok(())
     }
 
     /// Writes the state of friction, the work and the losses.
@@ -322,24 +224,13 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
 }
 
 /// The motion of obstacles and surfaces in a step.
-struct Motion<const D: usize> {
+pub(super) struct Motion<const D: usize> {
     /// The poses of all obstacles at both ends.
-    poses: [Vec<Pose<D>>; 2],
+    pub poses: [Vec<Pose<D>>; 2],
     /// The positions of all points at the end.
-    positions: Vec<Vector<f64, D>>,
+    pub positions: Vec<Vector<f64, D>>,
     /// The positions of facing points relative to the other body, at both ends.
-    relative: HashMap<usize, [Vector<f64, D>; 2]>,
-}
-
-/// The box through which the surface of a body moves in a step.
-#[derive(Clone, Copy)]
-struct Swept<const D: usize> {
-    low: Vector<f64, D>,
-    high: Vector<f64, D>,
-    /// The motion of one point.
-    motion: Vector<f64, D>,
-    /// The largest difference of another point's motion.
-    spread: f64,
+    pub relative: HashMap<usize, [Vector<f64, D>; 2]>,
 }
 
 impl<const D: usize> ContactUpdate<D> {
@@ -407,31 +298,8 @@ fn points_at<const D: usize, L: Law>(
     phi: &[Vector<f64, D>],
     poses: &[Pose<D>],
 ) -> Vec<ContactPoint<f64, D>> {
-    ContactForce::pressure(step).map_or_else(Vec::new, |force| force.contact_points_at(phi, poses))
-}
-
-/// The depth, in spacings, of a point that enters an obstacle too deeply or goes through it; `None` for an allowed motion. The point moves
-/// straight between two positions in the frame of the obstacle.
-fn entry<const D: usize>(shape: &Shape<D>, [start, end]: &[Vector<f64, D>; 2], h: f64) -> Option<f64> {
-    let length = (end - start).norm();
-    let before = shape.signed_distance(start);
-    // A positive distance is at most the distance of the surface. NaN stays outside.
-    if before >= length || before.is_nan() {
-        return None;
-    }
-    let (after, normal) = shape.distance_and_normal(end);
-    let depth = -after / h;
-    if before < 0.0 {
-        let turned = after < 0.0 && shape.normal(start).dot(&normal) < 0.0;
-        return turned.then_some(depth);
-    }
-    if depth > DEEPEST_ENTRY {
-        return Some(depth);
-    }
-    let samples = (length / (SAMPLED * h)).ceil().min(MOST_SAMPLES);
-    let at = |sample: f64| shape.signed_distance(&(start + (end - start) * (sample / samples)));
-    let deepest = (1..samples as u32).map(|sample| at(f64::from(sample))).fold(0.0, f64::min);
-    (after >= 0.0 && deepest < 0.0).then_some(-deepest / h)
+    let step = Step { poses: Some(poses), ..*step };
+    ContactForce::pressure(&step).map_or_else(Vec::new, |force| force.contact_points(phi))
 }
 
 /// The anchors of points that touch nothing: their positions.

@@ -2,6 +2,7 @@
 
 mod balance;
 mod contacts;
+mod entry;
 mod history;
 mod next_step;
 mod preconditioner;

@@ -164,7 +164,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         // At t_n, too, laws need the length of a step.
         let dt = if alphas.dt > 0.0 { alphas.dt } else { self.clock.step() };
         Equilibrium::new(
-            terms::Step { particles, bodies, loads, supports, nodal, alphas, lumping, time: t, dt },
+            terms::Step { particles, bodies, loads, supports, nodal, alphas, lumping, time: t, dt, poses: None },
             prescribed,
         )
     }

@@ -4,7 +4,6 @@ use super::contacts::ContactUpdate;
 use super::{Reaction, Simulation, StepError};
 use crate::approximation::ShapeFunction;
 use crate::material::Law;
-use crate::mechanics::loads::Loads;
 use crate::mechanics::residual::Equilibrium;
 use crate::mechanics::schemes::Alphas;
 use crate::mechanics::terms::{self, Role};
@@ -28,8 +27,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     ///
     /// A reaction is the force at t_{n+1} plus J/Δt, with J the impulse, summed over a prescribed condition. The work of all external
     /// forces, including the reactions of moving walls, is Σ [½ (f_n + f_{n+1}) + J/Δt]·Δφ; in the energy–momentum scheme it is
-    /// Σ (f_{n+½} + J/Δt)·Δφ. In the mixed form, `dilatation` is that of the cells
-    /// at t_n.
+    /// Σ (f_{n+½} + J/Δt)·Δφ. In the mixed form, `dilatation` is that of the cells at t_n.
     pub(super) fn accounts(
         &self,
         balanced: &Equilibrium<'_, D, L>,
@@ -39,15 +37,14 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     ) -> Result<Accounts<D>, StepError> {
         let (terms::Step { supports, nodal, .. }, phi) = (balanced.step, update.motion());
         let (t, dt) = (self.load(), self.clock.step());
+        let before = supports.pool().collect(nodal.moved(supports.nodes()));
+        let free = self.free_after(&balanced.step, &before, phi)?;
+        let poses = self.poses_after(&free, t + dt);
         let mut end = balanced;
-        let (at_end, after);
+        let after;
         if self.settings.scheme.instant() < 1.0 {
             let ends = self.equilibrium(supports, nodal, balanced.prescribed, self.settings.scheme.end(dt), t + dt);
-            at_end = self.loads_at_end(&balanced.step, phi)?;
-            after = match &at_end {
-                Some(loads) => Equilibrium::new(terms::Step { loads, ..ends.step }, ends.prescribed),
-                None => ends,
-            };
+            after = Equilibrium::new(terms::Step { poses: Some(&poses), ..ends.step }, ends.prescribed);
             // The stress at the end is evaluated here for the first time, and fails where det F ≤ 0.
             after.forces(Role::Stores, phi)?;
             end = &after;
@@ -55,7 +52,6 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let is_mean = balanced.step.alphas.discrete_gradient;
         let (reactions, mut work) = self.reactions(end, update, is_mean)?;
         // At t_n: a = a_n and Δφ = 0.
-        let before = supports.pool().collect(nodal.moved(supports.nodes()));
         let start = self.equilibrium(supports, nodal, end.prescribed, Alphas::START, t);
         let middle = if is_mean { halfway(&before, phi) } else { Vec::new() };
         if end.prescribed.iter().any(|dof| dof.moving) {
@@ -75,13 +71,11 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         };
         work -= work_of(Role::Loads)?;
         let dissipated = if self.loads.damping.is_some() { work_of(Role::Dissipates)? } else { 0.0 };
-        let contacts = self.contact_update(&balanced.step, phi)?;
+        let contacts = self.contact_update(&balanced.step, [&before, phi], free, poses)?;
         let (work, dissipated) = (work + contacts.work, dissipated + contacts.friction_loss);
         Ok(Accounts { reactions, work, dissipated, contacts })
     }
-}
 
-impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// The reactions at the end of a step, and their part of the work of moving walls: half of the force, or none of it where forces act in the
     /// middle, and the whole impulse.
     fn reactions(
@@ -109,24 +103,6 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             }
         }
         Ok((reactions, work))
-    }
-
-    /// The loads with all free obstacles held where they are at the end of a step; `None` if no obstacle moves freely.
-    fn loads_at_end(
-        &self,
-        step: &terms::Step<'_, D, L>,
-        phi: &[Vector<f64, D>],
-    ) -> Result<Option<Loads<D>>, StepError> {
-        if !self.loads.contacts.has_free_obstacle() {
-            return Ok(None);
-        }
-        let before: Vec<_> = step.nodal.moved(step.supports.nodes()).collect();
-        let mut loads = self.loads.clone();
-        for (obstacle, body) in loads.contacts.obstacles.iter_mut().zip(self.free_after(step, &before, phi)?) {
-            obstacle.held = body.map(|body| body.pose(&Vector::zeros()));
-            obstacle.free = None;
-        }
-        Ok(Some(loads))
     }
 }
 

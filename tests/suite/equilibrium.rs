@@ -141,7 +141,7 @@ impl<const D: usize> Cloud<D> {
         let Self { particles, bodies, loads, supports, nodal } = self;
         let dt = 0.5;
         let alphas = Newmark::default().alphas(dt);
-        Step { particles, bodies, loads, supports, nodal, alphas, lumping, time: 0.0, dt }
+        Step { particles, bodies, loads, supports, nodal, alphas, lumping, time: 0.0, dt, poses: None }
     }
 
     fn equilibrium<'a>(&'a self, lumping: f64, prescribed: &'a [PrescribedDof]) -> Equilibrium<'a, D, Faulty> {

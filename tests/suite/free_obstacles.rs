@@ -66,19 +66,73 @@ fn momentum_goes_from_the_obstacle_to_the_body_and_none_is_lost() -> Result<(), 
     for k in 0..2 {
         assert!((end[k] - start[k]).abs() < 1e-10 * start[0], "{start:?} {end:?}");
     }
-    // Newmark's method keeps angular momentum to its order in the time step only.
-    assert!((end[2] - start[2]).abs() < 2e-3 * start[0], "{start:?} {end:?}");
     Ok(())
+}
+
+/// The change of angular momentum in the impact, over the linear momentum, for steps of this length. A lumped share of the mass would lose
+/// angular momentum, whatever the step.
+fn change_of_angular_momentum(step: f64) -> Result<f64, Failure> {
+    let changes = [("/time/step", json!(step)), ("/time/lumping", json!(0)), ("/grid/reset", json!("never"))];
+    let mut simulation: Simulation<2> = built(&with(flying(), &changes))?;
+    let start = momenta(&simulation)?;
+    run_to(&mut simulation, 0.3)?;
+    Ok((momenta(&simulation)?[2] - start[2]) / start[0])
+}
+
+#[test]
+fn angular_momentum_is_kept_to_the_order_of_the_scheme() -> Result<(), Failure> {
+    let [coarse, fine] = [change_of_angular_momentum(0.004)?, change_of_angular_momentum(0.001)?];
+    assert!(coarse.abs() < 1e-4 && fine.abs() < 0.25 * coarse.abs(), "{coarse} {fine}");
+    Ok(())
+}
+
+/// The work of the disc on the block over the energy that the disc has lost, minus 1.
+fn excess_of_work(changes: &[(&str, Value)]) -> Result<f64, Failure> {
+    let mut simulation: Simulation<2> = built(&with(flying(), changes))?;
+    let start = free(&simulation)?.kinetic_energy();
+    run_to(&mut simulation, 0.3)?;
+    let lost = start - free(&simulation)?.kinetic_energy();
+    let work = simulation.loads.contacts.obstacles[0].work;
+    assert!(work > 0.2 * start, "{work} of {start}");
+    Ok(work / lost - 1.0)
 }
 
 #[test]
 fn the_energy_of_the_obstacle_is_its_work_on_the_body() -> Result<(), Failure> {
-    let mut simulation: Simulation<2> = built(&with(flying(), &[("/time/step", json!(0.001))]))?;
-    let start = free(&simulation)?.kinetic_energy();
-    run_to(&mut simulation, 0.3)?;
-    let disc = &simulation.loads.contacts.obstacles[0];
-    let lost = start - free(&simulation)?.kinetic_energy();
-    assert!(disc.work > 0.2 * start && (disc.work / lost - 1.0).abs() < 1e-3, "{} {lost}", disc.work);
+    // Without friction the disc does not turn. The trapezoidal work of Newmark's method is then exactly the change of its energy.
+    let smooth = [("/obstacles/0/friction", json!(0)), ("/obstacles/0/free/spin", json!([0]))];
+    assert!(excess_of_work(&smooth)?.abs() < 1e-10, "{}", excess_of_work(&smooth)?);
+    // A turn leaves an error of the order of the scheme.
+    let [coarse, fine] = [0.002, 0.001].map(|step| excess_of_work(&[("/time/step", json!(step))]));
+    let [coarse, fine] = [coarse?.abs(), fine?.abs()];
+    assert!(fine < 1e-3 && fine < 0.5 * coarse, "{coarse} {fine}");
+    Ok(())
+}
+
+#[test]
+fn the_work_of_a_moving_wall_closes_the_balance_beside_a_free_obstacle() -> Result<(), Failure> {
+    // A layer one cell thick between the moving floor and the disc: contact acts on the nodes of the floor.
+    let scene = json!({
+        "grid": { "size": [3, 3], "spacing": 0.25, "reset": "never" },
+        "time": { "step": 0.001, "end": 1, "lumping": 0 },
+        "bodies": [solid("layer", 1000, json!({ "box": { "min": [1, 0], "max": [2, 0.25] } }))],
+        "boundary": { "bottom": { "velocity": [[0, [0, 0]], [0.02, [0, 0]], [0.04, [0, 1]], [0.2, [0, 1]]] } },
+        "obstacles": [{ "name": "disc", "shape": { "ball": { "center": [1.5, 0.56], "radius": 0.3 } },
+                        "free": { "density": 3, "velocity": [0, -0.5] } }]
+    });
+    for scheme in [json!("newmark"), json!({ "generalized_alpha": { "spectral_radius": 0.9 } })] {
+        let mut simulation: Simulation<2> = built(&with(scene.clone(), &[("/time/scheme", scheme.clone())]))?;
+        let (mut touched, mut apart) = (false, 0.0_f64);
+        while simulation.clock.time() < 0.06 {
+            touched |= simulation.advance()?.touches();
+            let energy =
+                simulation.particles.kinetic_energy() + simulation.strain_energy() + simulation.contact_energy();
+            apart = apart.max((energy - simulation.external_work).abs());
+        }
+        // The error of the time scheme is 0.2 %. Without the contact at the start of each step, it would be 4 %.
+        let scale = simulation.external_work;
+        assert!(touched && apart < 0.01 * scale, "{scheme}: {apart} of {scale}");
+    }
     Ok(())
 }
 

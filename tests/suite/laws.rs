@@ -75,7 +75,18 @@ fn results<const D: usize, L: Law>(
 ) -> Result<Results<D>, Failure> {
     let (nodal, loads) = (Nodal::project(particles, supports, LUMPING)?, Loads::default());
     let (alphas, lumping) = (alphas(), LUMPING);
-    let step = Step { particles, bodies, loads: &loads, supports, nodal: &nodal, alphas, lumping, time: 0.0, dt: DT };
+    let step = Step {
+        particles,
+        bodies,
+        loads: &loads,
+        supports,
+        nodal: &nodal,
+        alphas,
+        lumping,
+        time: 0.0,
+        dt: DT,
+        poses: None,
+    };
     let equilibrium = Equilibrium::new(step, &[]);
     let residual = equilibrium.residual(dphi)?;
     let seeded: Vec<_> = dphi.iter().zip(u).map(|(x, u)| x.zip_map(u, Dual64::new)).collect();
@@ -204,7 +215,7 @@ fn fails<L: Law>(
     expected: Inadmissible,
 ) {
     let (nodal, loads, alphas) = (&Nodal::at_rest(particles, supports), &Loads::default(), alphas());
-    let step = Step { particles, bodies, loads, supports, nodal, alphas, lumping: 1.0, time: 0.0, dt: DT };
+    let step = Step { particles, bodies, loads, supports, nodal, alphas, lumping: 1.0, time: 0.0, dt: DT, poses: None };
     let equilibrium = Equilibrium::new(step, &[]);
     assert_eq!(equilibrium.residual(zero), Err(expected));
     assert_eq!(

@@ -159,7 +159,8 @@ fn every_load_follows_its_curve() -> Result<(), Failure> {
         let (particles, bodies, supports, nodal) = (&particles, &bodies[..], &supports, &nodal);
         let forces = |gravity: Option<Gravity<2>>, surface: &[SurfaceLoad<2>]| {
             let loads = &Loads { gravity, surface: surface.to_vec(), ..Loads::default() };
-            let step = Step { particles, bodies, loads, supports, nodal, alphas, lumping: 1.0, time: t, dt: 1.0 };
+            let step =
+                Step { particles, bodies, loads, supports, nodal, alphas, lumping: 1.0, time: t, dt: 1.0, poses: None };
             Equilibrium::new(step, &[]).external_force(&zero)
         };
         for force in &forces(loads.gravity.clone(), &loads.surface[..1])? {

@@ -230,7 +230,8 @@ fn computed<const D: usize>(
     let nodal = Nodal::project(particles, supports, 1.0)?;
     let (alphas, loads) = (Newmark::default().alphas(1.0), Loads::default());
     let (nodal, loads) = (&nodal, &loads);
-    let step = Step { particles, bodies, loads, supports, nodal, alphas, lumping: 0.5, time: 0.0, dt: 1.0 };
+    let step =
+        Step { particles, bodies, loads, supports, nodal, alphas, lumping: 0.5, time: 0.0, dt: 1.0, poses: None };
     let equilibrium = Equilibrium::new(step, &[]);
     let u = field::<D>(nodes);
     let dphi: Vec<_> = u.iter().map(|u| u * 0.02).collect();

@@ -2,6 +2,7 @@
 
 use super::RigidBody;
 use super::prescribed::Motion;
+use crate::grid::Grid;
 use crate::scalar::Real;
 use crate::shape::Shape;
 use crate::tensor::{Tensor, Vector, identity};
@@ -17,8 +18,6 @@ pub struct Obstacle<const D: usize> {
     pub motion: [Option<Motion<D>>; D],
     /// The mass and the state of an obstacle that moves freely; `None` if its motion is prescribed.
     pub free: Option<RigidBody<D>>,
-    /// A pose that the obstacle keeps at all times, in place of its motion.
-    pub held: Option<Pose<D>>,
     /// Points of the surface, in the frame of the obstacle, where obstacles move freely. There obstacles must not meet.
     pub surface: Vec<Vector<f64, D>>,
     /// The penalty stiffness (pressure per depth) in units of min(Λ + 2G, 4G)/h of the body, > 0.
@@ -65,8 +64,8 @@ impl<const D: usize> Obstacle<D> {
             let of = |i: usize| self.motion[i].as_ref().map_or(0.0, |motion| motion.over(0.0, t, x, i).increment);
             Vector::<f64, D>::from_fn(|i, _| of(i))
         };
-        if let Some(pose) = self.held.or(self.free.as_ref().map(|body| body.pose(&Vector::zeros()))) {
-            return pose;
+        if let Some(body) = &self.free {
+            return body.pose(&Vector::zeros());
         }
         mutant!("obstacle: it rests": { return Pose { rotation: identity(), shift: Vector::zeros() }; });
         let shift = moved(&Vector::zeros());
@@ -89,8 +88,15 @@ impl<const D: usize> Obstacle<D> {
         let name = name.into();
         let (surface, anchors) = (Vec::new(), Vec::new());
         let (work, friction_loss) = (0.0, 0.0);
-        let (free, held) = (None, None);
-        Self { name, shape, motion, free, held, surface, stiffness, friction, anchors, work, friction_loss }
+        Self { name, shape, motion, free: None, surface, stiffness, friction, anchors, work, friction_loss }
+    }
+
+    /// Whether a free obstacle lies outside the grid: a ball about its centre of mass that holds its bounding box.
+    pub(crate) fn has_left(&self, grid: &Grid<D>) -> bool {
+        let Some(body) = &self.free else { return false };
+        let ((min, max), end) = (self.shape.bounding_box(), grid.position(grid.cells));
+        let radius = (max - body.center).sup(&(body.center - min)).norm();
+        (0..D).any(|k| body.position[k] + radius < grid.origin[k] || body.position[k] - radius > end[k])
     }
 
     /// Whether the obstacle moves at any time.

@@ -5,10 +5,10 @@ use super::term::{FunctionsAt, Linearized, LinearizedTerm, Step, Sum, Term, summ
 use crate::material::{Law, p_wave_modulus, poissons_ratio};
 use crate::mechanics::constitutive::{Inadmissible, Part};
 use crate::mechanics::contact::{
-    Carrier, ContactPoint, Response, Surroundings, Touching, obstacle_points, pair_points, points_on,
+    Carrier, ContactPoint, FreeBalance, FreeMotion, FreePoint, Response, Surroundings, Touching, obstacle_points,
+    pair_points, points_on,
 };
-use crate::mechanics::free_obstacle::{FreeBalance, FreeMotion, FreePoint};
-use crate::mechanics::loads::{Pose, RigidBody};
+use crate::mechanics::loads::{Obstacle, Pose, RigidBody};
 use crate::mechanics::sweep::{Number, Supports};
 use crate::mechanics::trial::Trial;
 use crate::particles::Body;
@@ -37,18 +37,18 @@ impl<'a, const D: usize, L: Law> ContactForce<'a, D, L> {
     }
 
     /// All points in contact at Δφ.
-    fn contact_points<T: Number>(&self, dphi: &[Vector<T, D>]) -> Vec<ContactPoint<T, D>> {
-        self.contact_points_at(dphi, &self.poses(dphi))
+    pub(crate) fn contact_points<T: Number>(&self, dphi: &[Vector<T, D>]) -> Vec<ContactPoint<T, D>> {
+        self.contact_points_with(&self.free_motions(dphi), dphi)
     }
 
-    /// All points in contact at Δφ and at these poses of all obstacles.
-    pub(crate) fn contact_points_at<T: Number>(
+    /// All points in contact at Δφ, with the motions of free obstacles there.
+    fn contact_points_with<T: Number>(
         &self,
+        motions: &[Option<FreeMotion>],
         dphi: &[Vector<T, D>],
-        poses: &[Pose<D, T>],
     ) -> Vec<ContactPoint<T, D>> {
         let (contacts, around) = (&self.step.loads.contacts, self.around(dphi));
-        let mut found = obstacle_points(contacts, &around, poses);
+        let mut found = obstacle_points(contacts, &around, &self.poses(motions, dphi));
         found.extend(pair_points(contacts, &around));
         found
     }
@@ -69,31 +69,36 @@ impl<'a, const D: usize, L: Law> ContactForce<'a, D, L> {
         }
     }
 
-    /// The poses of all obstacles at Δφ.
-    fn poses<T: Number>(&self, dphi: &[Vector<T, D>]) -> Vec<Pose<D, T>> {
+    /// The poses of all obstacles at Δφ, with the motions of free obstacles there.
+    fn poses<T: Number>(&self, motions: &[Option<FreeMotion>], dphi: &[Vector<T, D>]) -> Vec<Pose<D, T>> {
+        if let Some(poses) = self.step.poses {
+            return poses.iter().map(Pose::lit).collect();
+        }
         let (contacts, around) = (&self.step.loads.contacts, self.around(dphi));
-        let pose = |(index, motion): (usize, Option<FreeMotion>)| {
+        let pose = |(index, motion): (usize, &Option<FreeMotion>)| {
             let obstacle = &contacts.obstacles[index];
             let (Some(motion), Some(body)) = (motion, &obstacle.free) else {
                 return obstacle.pose(self.step.time).lit();
             };
             let points_at = |q: &Vector<T, 6>| points_on(contacts, &around, index, &body.pose(q));
-            let q = self.free_balance(body).implicit(motion, points_at);
-            body.pose(&q)
+            body.pose(&self.free_balance(body).implicit(*motion, points_at))
         };
-        let values: Vec<Vector<f64, D>> = dphi.iter().map(|x| x.map(T::value)).collect();
-        self.free_motions(&values).into_iter().enumerate().map(pose).collect()
+        motions.iter().enumerate().map(pose).collect()
     }
 
-    /// The motion of every obstacle that moves freely, at Δφ.
-    pub(crate) fn free_motions(&self, dphi: &[Vector<f64, D>]) -> Vec<Option<FreeMotion>> {
-        let (contacts, around) = (&self.step.loads.contacts, self.around(dphi));
-        let motion = |(index, body): (usize, &RigidBody<D>)| {
-            let points_at = |q: &Vector<f64, 6>| points_on(contacts, &around, index, &body.pose(q));
-            self.free_balance(body).solve(points_at)
+    /// The motion of each obstacle at Δφ; `None` for an obstacle that does not move freely, or whose pose is known.
+    pub(crate) fn free_motions<T: Number>(&self, dphi: &[Vector<T, D>]) -> Vec<Option<FreeMotion>> {
+        let contacts = &self.step.loads.contacts;
+        if self.step.poses.is_some() || !contacts.has_free_obstacle() {
+            return vec![None; contacts.obstacles.len()];
+        }
+        let values: Vec<Vector<f64, D>> = dphi.iter().map(|x| x.map(T::value)).collect();
+        let around = self.around(&values);
+        let motion = |(index, obstacle): (usize, &Obstacle<D>)| {
+            let body = obstacle.free.as_ref()?;
+            Some(self.free_balance(body).solve(|q| points_on(contacts, &around, index, &body.pose(q))))
         };
-        let all = contacts.obstacles.iter().enumerate();
-        all.map(|(index, obstacle)| obstacle.free.as_ref().map(|body| motion((index, body)))).collect()
+        contacts.obstacles.iter().enumerate().map(motion).collect()
     }
 
     fn free_balance<'x>(&self, body: &'x RigidBody<D>) -> FreeBalance<'x, D> {
@@ -177,7 +182,8 @@ impl<const D: usize, L: Law> Term<D> for ContactForce<'_, D, L> {
 impl<const D: usize, L: Law> ContactForce<'_, D, L> {
     fn linearized(&self, dphi: &[Vector<f64, D>]) -> Vec<LinearizedPoint<D>> {
         let contacts = &self.step.loads.contacts;
-        let (motions, points) = (self.free_motions(dphi), self.contact_points(dphi));
+        let motions = self.free_motions(dphi);
+        let points = self.contact_points_with(&motions, dphi);
         let on_free = |one: &ContactPoint<f64, D>| {
             let Touching::Obstacle(index) = one.touching else { return None };
             let balance = self.free_balance(contacts.obstacles[index].free.as_ref()?);

@@ -2,7 +2,7 @@
 
 use crate::mechanics::constitutive::{Inadmissible, Part};
 use crate::mechanics::dilatation::Scale;
-use crate::mechanics::loads::Loads;
+use crate::mechanics::loads::{Loads, Pose};
 use crate::mechanics::mass::Mass;
 use crate::mechanics::schemes::Alphas;
 use crate::mechanics::sweep::{At, Group, Mode, Number, Quadratic, Supports};
@@ -33,6 +33,8 @@ pub struct Step<'a, const D: usize, L> {
     pub time: f64,
     /// Δt
     pub dt: f64,
+    /// The poses of all obstacles where they are known. Otherwise, free obstacles move so that forces on them are in balance.
+    pub poses: Option<&'a [Pose<D>]>,
 }
 
 impl<const D: usize, L> Clone for Step<'_, D, L> {

@@ -5,7 +5,7 @@
 //!
 //! A change of the places changes q by δq = −(∂r/∂q)⁻¹ Σ ∂r/∂x δx.
 
-use crate::mechanics::contact::{ContactPoint, Response};
+use super::{ContactPoint, Response};
 use crate::mechanics::loads::RigidBody;
 use crate::mechanics::loads::rigid_body::{in_space, in_use, skew, stacked, translation, turn};
 use crate::mechanics::schemes::Alphas;
@@ -21,7 +21,7 @@ const MOST_ITERATIONS: usize = 50;
 const LAST_STEP: f64 = 1e-8;
 
 /// The largest number of halvings of a Newton step that does not reduce the residual.
-const MOST_HALVINGS: usize = 10;
+const MOST_HALVINGS: i32 = 10;
 
 /// The balance of forces of a free obstacle.
 pub(crate) struct FreeBalance<'a, const D: usize> {
@@ -40,7 +40,7 @@ pub(crate) struct FreeMotion {
     pub q: Vector<f64, 6>,
     /// (∂r/∂q)⁻¹
     pub inverse_slope: Tensor<f64, 6>,
-    /// Whether forces are in balance there. A turn by more than π in a step is not accepted.
+    /// Whether forces are in balance there.
     pub is_balanced: bool,
 }
 
@@ -50,6 +50,15 @@ pub(crate) struct FreePoint<const D: usize> {
     pub of_motion: SMatrix<f64, D, 6>,
     /// ∂q/∂x, also through the other forces on the obstacle.
     pub motion: SMatrix<f64, 6, D>,
+}
+
+impl FreeMotion {
+    /// The motion of the whole step, of which this is the part `theta`; `None` if it is not accepted. A turn of the whole step is below π.
+    pub fn whole(&self, theta: f64) -> Option<Vector<f64, 6>> {
+        let q = self.q / theta;
+        mutant!("free obstacles: they stay where forces are in balance": q = self.q);
+        (self.is_balanced && turn(&q).norm() < PI).then_some(q)
+    }
 }
 
 impl<const D: usize> FreeBalance<'_, D> {
@@ -68,17 +77,15 @@ impl<const D: usize> FreeBalance<'_, D> {
                 let q = within_half_turn(q + step);
                 return self.found(q, &points_at(&q), true);
             }
-            let (mut share, before) = (1.0, self.size(&residual));
-            for _ in 0..=MOST_HALVINGS {
-                let trial = within_half_turn(q + step * share);
-                points = points_at(&trial);
-                residual = self.residual(&trial, &points);
+            let (start, before) = (q, self.size(&residual));
+            for halvings in 0..=MOST_HALVINGS {
+                q = within_half_turn(start + step * 0.5_f64.powi(halvings));
+                points = points_at(&q);
+                residual = self.residual(&q, &points);
                 if self.size(&residual) < before {
                     break;
                 }
-                share *= 0.5;
             }
-            q = within_half_turn(q + step * share);
         }
         self.found(q, &points, false)
     }
@@ -87,18 +94,19 @@ impl<const D: usize> FreeBalance<'_, D> {
         let inverse = self.slope(&q, points).try_inverse();
         let inverse_slope = inverse.unwrap_or_else(Tensor::zeros);
         let q = q - inverse_slope * self.residual(&q, points);
-        let is_balanced = is_balanced && inverse.is_some() && turn(&q).norm() < PI;
-        FreeMotion { q, inverse_slope, is_balanced }
+        FreeMotion { q, inverse_slope, is_balanced: is_balanced && inverse.is_some() }
     }
 
-    /// q with all derivatives that `T` carries, by the implicit function theorem. Each iteration makes one more order of them right.
+    /// q with all derivatives that `T` carries, by the implicit function theorem. Each iteration makes one more order of them right. The last
+    /// iteration changes nothing if ∂r/∂q is exact, so that the check of the tangent sees a wrong ∂r/∂q.
     pub fn implicit<T: Real>(
         &self,
         FreeMotion { q, inverse_slope, .. }: FreeMotion,
         points_at: impl Fn(&Vector<T, 6>) -> Vec<ContactPoint<T, D>>,
     ) -> Vector<T, 6> {
         let inverse = inverse_slope.map(T::lit);
-        (0..T::NDERIV).fold(q.map(T::lit), |q, _| {
+        let iterations = if T::NDERIV > 0 { T::NDERIV + 1 } else { 0 };
+        (0..iterations).fold(q.map(T::lit), |q, _| {
             let step = inverse * self.residual(&q, &points_at(&q));
             // The value stays the same bits for all number types.
             q - (step - step.map(T::value).map(T::lit))

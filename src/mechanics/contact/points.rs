@@ -1,0 +1,257 @@
+//! The points of surfaces that touch an obstacle or another body.
+
+use super::law::{ContactLaw, Ends, Response};
+use crate::mechanics::loads::{BodyContact, Contacts, Facing, Partner, Pose, SurfacePoint};
+use crate::mechanics::sweep::Supports;
+use crate::scalar::Real;
+use crate::shape::Feature;
+use crate::tensor::{Tensor, Vector, identity};
+
+/// The smallest elastic slip ε in grid spacings.
+const ELASTIC_SLIP: f64 = 0.005;
+
+/// The partner of a point in contact.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Touching {
+    /// An obstacle, by its number.
+    Obstacle(usize),
+    /// Another body.
+    Pair {
+        /// The number of the pair.
+        pair: usize,
+        /// Whether the point belongs to the first body of the pair.
+        is_first: bool,
+    },
+}
+
+/// A place at a fixed offset from a particle, in the configuration of the last grid reset, and its share of a relative position.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Carrier<const D: usize> {
+    pub particle: usize,
+    pub share: f64,
+    pub offset: Vector<f64, D>,
+}
+
+/// A point of a surface that touches an obstacle or another body.
+pub(crate) struct ContactPoint<T, const D: usize> {
+    pub touching: Touching,
+    /// The number of the point in [`Contacts::points`].
+    pub number: usize,
+    /// The reference area that the point stands for. Both bodies of a pair have points, each for half its area.
+    pub area: f64,
+    /// The places whose positions, times their shares, sum to the position of the point; relative to the other body, where it touches one.
+    pub carriers: Vec<Carrier<D>>,
+    /// The pose of the obstacle. A pair has the frame of space.
+    pub pose: Pose<D, T>,
+    /// The law there.
+    pub law: ContactLaw<D>,
+    /// The position of the point in the frame of the obstacle, or relative to the place on the other body.
+    pub y: Vector<T, D>,
+}
+
+/// The surroundings of the contacts: the time, the grid spacing, the penalty stiffness of a particle's body (pressure per depth), and the
+/// position of a carrier.
+pub(crate) struct Surroundings<'a, S, P, const D: usize> {
+    pub t: f64,
+    /// t_n and the positions of the particles there, where pressures are means over the step.
+    pub start: Option<(f64, &'a [Vector<f64, D>])>,
+    pub spacing: f64,
+    pub stiffness: S,
+    pub position: P,
+}
+
+/// The poses of all obstacles at t_n and t_{n+1}, and the positions of the particles at t_n, where pressures are means over the step.
+type StepEnds<'a, const D: usize> = Option<([Vec<Pose<D>>; 2], &'a [Vector<f64, D>])>;
+
+/// All points that touch an obstacle, with the poses of all obstacles.
+pub(crate) fn obstacle_points<T: Real, const D: usize>(
+    contacts: &Contacts<D>,
+    around: &Surroundings<'_, impl Fn(usize) -> f64, impl Fn(&Carrier<D>) -> Vector<T, D>, D>,
+    poses: &[Pose<D, T>],
+) -> Vec<ContactPoint<T, D>> {
+    let Contacts { points, obstacles, .. } = contacts;
+    let poses_at = |t: f64| obstacles.iter().map(|obstacle| obstacle.pose(t)).collect::<Vec<Pose<D>>>();
+    let ends = around.start.map(|(t_n, at)| ([poses_at(t_n), poses_at(2.0 * around.t - t_n)], at));
+    let mut found = Vec::new();
+    for number in (0..points.len()).filter(|_| !obstacles.is_empty()) {
+        let x = (around.position)(&Carrier::at(points[number].particle));
+        let touched = |(index, pose)| obstacle_point(contacts, around, &ends, (number, &x), (index, pose));
+        found.extend(poses.iter().enumerate().filter_map(touched));
+    }
+    found
+}
+
+/// All points that touch a free obstacle in a pose.
+pub(crate) fn points_on<T: Real, const D: usize>(
+    contacts: &Contacts<D>,
+    around: &Surroundings<'_, impl Fn(usize) -> f64, impl Fn(&Carrier<D>) -> Vector<T, D>, D>,
+    index: usize,
+    pose: &Pose<D, T>,
+) -> Vec<ContactPoint<T, D>> {
+    let point = |(number, point): (usize, &SurfacePoint<D>)| {
+        let x = (around.position)(&Carrier::at(point.particle));
+        obstacle_point(contacts, around, &None, (number, &x), (index, pose))
+    };
+    contacts.points.iter().enumerate().filter_map(point).collect()
+}
+
+/// The contact of a point with an obstacle; `None` without contact.
+fn obstacle_point<T: Real, const D: usize>(
+    Contacts { points, obstacles, .. }: &Contacts<D>,
+    Surroundings { spacing, stiffness, .. }: &Surroundings<
+        '_,
+        impl Fn(usize) -> f64,
+        impl Fn(&Carrier<D>) -> Vector<T, D>,
+        D,
+    >,
+    ends: &StepEnds<'_, D>,
+    (number, x): (usize, &Vector<T, D>),
+    (index, pose): (usize, &Pose<D, T>),
+) -> Option<ContactPoint<T, D>> {
+    let (SurfacePoint { particle, area, .. }, obstacle) = (points[number], &obstacles[index]);
+    let y = pose.to_frame(x);
+    let at = y.map(T::value);
+    let distance = |y: &Vector<f64, D>| obstacle.shape.signed_distance(y);
+    let mean = ends.as_ref().map(|([first, last], start)| {
+        // x_{n+1} = 2 x − x_n
+        let (x_n, last) = (&start[particle], last[index]);
+        let map = last.rotation.tr_mul(&pose.rotation.map(T::value)) * 2.0;
+        let shift = last.rotation.tr_mul(&(pose.shift.map(T::value) * 2.0 - x_n - last.shift));
+        let feature = obstacle.shape.feature(&(map * at + shift));
+        Ends { gap: distance(&first[index].to_frame(x_n)), feature, map, shift }
+    });
+    let deepest = mean.as_ref().map_or(f64::INFINITY, |mean| mean.gap.min(distance(&(mean.map * at + mean.shift))));
+    // NaN touches nothing.
+    let here = distance(&at);
+    if here.is_nan() || here.min(deepest) >= 0.0 {
+        return None;
+    }
+    let law = ContactLaw {
+        feature: obstacle.shape.feature(&at),
+        stiffness: obstacle.stiffness * stiffness(particle),
+        friction: obstacle.friction,
+        elastic_slip: ELASTIC_SLIP * spacing,
+        anchor: obstacle.anchors.get(number).copied().unwrap_or(at),
+        mean,
+    };
+    let carriers = vec![Carrier::at(particle)];
+    Some(ContactPoint { touching: Touching::Obstacle(index), number, area, carriers, pose: *pose, law, y })
+}
+
+/// All points that touch another body.
+pub(crate) fn pair_points<T: Real, const D: usize>(
+    contacts: &Contacts<D>,
+    around: &Surroundings<'_, impl Fn(usize) -> f64, impl Fn(&Carrier<D>) -> Vector<T, D>, D>,
+) -> Vec<ContactPoint<T, D>> {
+    let facing = contacts.between.iter().flat_map(|between| between.facing.iter().map(move |one| (between, one)));
+    facing.filter_map(|(between, one)| pair_point(contacts, between, one, around)).collect()
+}
+
+/// The contact of a point that faces another body; `None` without contact.
+fn pair_point<T: Real, const D: usize>(
+    contacts: &Contacts<D>,
+    between: &BodyContact<D>,
+    one: &Facing<D>,
+    Surroundings { start, spacing, stiffness, position, .. }: &Surroundings<
+        '_,
+        impl Fn(usize) -> f64,
+        impl Fn(&Carrier<D>) -> Vector<T, D>,
+        D,
+    >,
+) -> Option<ContactPoint<T, D>> {
+    let carriers = one.carriers(contacts);
+    let y: Vector<T, D> =
+        carriers.iter().fold(Vector::zeros(), |y, carrier| y + position(carrier) * T::lit(carrier.share));
+    let feature = Feature::Plane { point: Vector::zeros(), normal: one.normal };
+    let gap = one.normal.dot(&y.map(T::value));
+    let mean = start.map(|_| Ends {
+        gap: one.normal.dot(&one.start),
+        feature: feature.clone(),
+        map: identity::<f64, D>() * 2.0,
+        shift: -one.start,
+    });
+    let deepest = mean.as_ref().map_or(gap, |mean| gap.min(mean.gap).min(2.0 * gap - mean.gap));
+    // NaN touches nothing.
+    if gap.is_nan() || deepest >= 0.0 {
+        return None;
+    }
+    let softer = carriers.iter().map(|carrier| stiffness(carrier.particle)).fold(f64::INFINITY, f64::min);
+    let slip = between.slips.get(one.number).copied().unwrap_or_else(Vector::zeros);
+    // The slip is y − a along the surface.
+    let anchor = one.start - slip;
+    mutant!("contact: bodies forget their slip": anchor = one.start);
+    let law = ContactLaw {
+        feature,
+        stiffness: between.stiffness * softer,
+        friction: between.friction,
+        elastic_slip: ELASTIC_SLIP * spacing,
+        anchor,
+        mean,
+    };
+    Some(ContactPoint {
+        touching: Touching::Pair { pair: one.pair, is_first: one.is_first },
+        number: one.number,
+        area: 0.5 * contacts.points[one.number].area,
+        carriers,
+        pose: Pose { rotation: identity(), shift: Vector::zeros() }.lit(),
+        law,
+        y,
+    })
+}
+
+impl<const D: usize> Carrier<D> {
+    /// The particle itself.
+    pub fn at(particle: usize) -> Self {
+        Self { particle, share: 1.0, offset: Vector::zeros() }
+    }
+
+    /// The position after the nodal motion `phi` since the last grid reset.
+    pub fn position<T: Real>(
+        &self,
+        reference: &[Vector<f64, D>],
+        supports: &Supports<D>,
+        phi: &[Vector<T, D>],
+    ) -> Vector<T, D> {
+        let start = (reference[self.particle] + self.offset).map(T::lit);
+        self.weights(supports).fold(start, |x, (node, n)| x + phi[node] * T::lit(n))
+    }
+
+    /// The nodes that move the place, and their functions there: N + ∇N·offset.
+    pub fn weights<'a>(&'a self, supports: &'a Supports<D>) -> impl Iterator<Item = (usize, f64)> + 'a {
+        supports.of(self.particle).map(|(node, n, grad_n)| (node, n + grad_n.dot(&self.offset)))
+    }
+}
+
+impl<const D: usize> Facing<D> {
+    /// The point, and its projection with negative shares.
+    pub(crate) fn carriers(&self, contacts: &Contacts<D>) -> Vec<Carrier<D>> {
+        let particle = |number: usize| contacts.points[number].particle;
+        let of = |&Partner { number, share, offset }: &Partner<D>| {
+            mutant!("contact: the other body has no reaction": { return Carrier { particle: particle(number), share: 0.0, offset }; });
+            mutant!("contact: the reaction acts beside the point": { return Carrier { particle: particle(number), share: -share, offset: Vector::zeros() }; });
+            Carrier { particle: particle(number), share: -share, offset }
+        };
+        std::iter::once(Carrier::at(particle(self.number))).chain(self.partners.iter().map(of)).collect()
+    }
+}
+
+impl<T: Real, const D: usize> ContactPoint<T, D> {
+    /// The force on the body of the point.
+    pub fn force(&self) -> Vector<T, D> {
+        let traction = self.law.traction(Response::Pressure, &self.y) + self.law.traction(Response::Friction, &self.y);
+        self.pose.rotation * traction * T::lit(self.area)
+    }
+
+    /// A part of this force.
+    pub fn force_of(&self, response: Response) -> Vector<T, D> {
+        self.pose.rotation * self.law.traction(response, &self.y) * T::lit(self.area)
+    }
+}
+
+impl<const D: usize> ContactPoint<f64, D> {
+    /// −∂f/∂x of a part of the force, at a fixed pose.
+    pub fn stiffness_of(&self, response: Response) -> Tensor<f64, D> {
+        let Pose { rotation, .. } = self.pose;
+        rotation * self.law.tangent(response, &self.y) * rotation.transpose() * self.area
+    }
+}

@@ -1,0 +1,156 @@
+//! Steps that are refused because a surface enters an obstacle or another body too deeply, or goes through it.
+
+use super::contacts::Motion;
+use super::{Simulation, StepError};
+use crate::approximation::ShapeFunction;
+use crate::material::Law;
+use crate::mechanics::facing::{DEEPEST, Overlap, REACH, overlaps};
+use crate::mechanics::loads::{Facing, Pose};
+use crate::shape::Shape;
+use crate::tensor::Vector;
+use std::collections::HashMap;
+
+/// A point may enter an obstacle or another body in one step by this many spacings at most. A longer step is repeated with half its length.
+const DEEPEST_ENTRY: f64 = 0.25;
+
+/// The path of a point in a step is tested for obstacles at places this far apart, in spacings, and at this many places at most.
+const SAMPLED: f64 = 0.05;
+const MOST_SAMPLES: f64 = 1000.0;
+
+impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
+    /// Refuses a step in which surfaces enter obstacles or bodies too deeply, or go through them.
+    pub(super) fn check_paths(&self, motion: &Motion<D>) -> Result<(), StepError> {
+        self.check_entry(motion)?;
+        self.check_overlap(motion)?;
+        self.check_meeting(motion)
+    }
+
+    /// Refuses a step in which a point enters an obstacle too deeply, or goes through an obstacle.
+    fn check_entry(&self, Motion { poses, positions, .. }: &Motion<D>) -> Result<(), StepError> {
+        let (contacts, h) = (&self.loads.contacts, self.grid.spacing);
+        mutant!("obstacles: a point may enter deeply in one step": { return Ok(()); });
+        for (point, end) in contacts.points.iter().zip(positions) {
+            let start = &self.particles.position[point.particle];
+            for (number, obstacle) in contacts.obstacles.iter().enumerate() {
+                let ends = [poses[0][number].to_frame(start), poses[1][number].to_frame(end)];
+                if let Some(depth) = entry(&obstacle.shape, &ends, h) {
+                    let position = start.iter().copied().collect();
+                    return Err(StepError::EntersObstacle { obstacle: obstacle.name.clone(), position, depth });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Refuses a step in which a point enters another body too deeply, or in which a body may have gone through another one.
+    fn check_overlap(&self, motion: &Motion<D>) -> Result<(), StepError> {
+        let contacts = &self.loads.contacts;
+        let Some(between) = &contacts.between else { return Ok(()) };
+        let h = self.grid.spacing;
+        let body_of = |number: usize| self.particles.body[contacts.points[number].particle];
+        let start = |number: usize| self.particles.position[contacts.points[number].particle];
+        let refused = |number: usize, pair: usize, depth: f64| {
+            let own = body_of(number);
+            let other = between.pairs[pair].bodies.into_iter().find(|&body| body != own).unwrap_or(own);
+            let names = [own, other].map(|body| self.bodies[body as usize].name.clone());
+            StepError::EntersBody { bodies: names, position: start(number).iter().copied().collect(), depth }
+        };
+        let depth = |one: &Facing<D>, relative: &Vector<f64, D>| -one.normal.dot(relative) / h;
+        let before: HashMap<usize, f64> =
+            between.facing.iter().map(|one| (one.number, depth(one, &one.start).max(0.0))).collect();
+        let known = between.facing.iter().map(|one| {
+            let depth = depth(one, &motion.relative[&one.number][1]);
+            (one.number, one.pair, depth)
+        });
+        // A point may have come around an edge, or along a curved surface.
+        let ends = overlaps(contacts, between, &self.particles, &self.grid, &motion.positions);
+        mutant!("contact: a point that did not face a body may enter it": ends = Vec::new());
+        let new = ends.iter().map(|&Overlap { number, pair, depth }| (number, pair, depth / h));
+        for (number, pair, depth) in known.chain(new) {
+            let entered = depth - before.get(&number).copied().unwrap_or(0.0);
+            if depth > DEEPEST || entered > DEEPEST_ENTRY {
+                return Err(refused(number, pair, depth));
+            }
+        }
+        // The search has seen what is within its reach, so nothing may come from farther away.
+        let boxes = self.boxes(&motion.positions);
+        for pair in &between.pairs {
+            let [Some(one), Some(other)] = pair.bodies.map(|body| boxes[body as usize]) else { continue };
+            let meet = (0..D).all(|k| one.low[k] <= other.high[k] && other.low[k] <= one.high[k]);
+            let apart = one.motion - other.motion;
+            if meet && apart.norm() + one.spread + other.spread > f64::from(REACH) * h {
+                let bodies = pair.bodies.map(|body| self.bodies[body as usize].name.clone());
+                return Err(StepError::PassesBody { bodies, reach: REACH });
+            }
+        }
+        Ok(())
+    }
+
+    /// The boxes through which the surfaces of all bodies move in the step; `None` for a body without surface points.
+    fn boxes(&self, positions: &[Vector<f64, D>]) -> Vec<Option<Swept<D>>> {
+        let mut boxes: Vec<Option<Swept<D>>> = vec![None; self.bodies.len()];
+        for (point, end) in self.loads.contacts.points.iter().zip(positions) {
+            let start = &self.particles.position[point.particle];
+            let (low, high, motion) = (start.inf(end), start.sup(end), end - start);
+            let swept = boxes[self.particles.body[point.particle] as usize];
+            let new = Swept { low, high, motion, spread: 0.0 };
+            boxes[self.particles.body[point.particle] as usize] = Some(swept.map_or(new, |swept| Swept {
+                low: swept.low.inf(&low),
+                high: swept.high.sup(&high),
+                motion: swept.motion,
+                spread: swept.spread.max((motion - swept.motion).norm()),
+            }));
+        }
+        boxes
+    }
+
+    /// Refuses a step in which a free obstacle and another one enter each other, or go through each other: obstacles do not push each other.
+    fn check_meeting(&self, Motion { poses: [start, end], .. }: &Motion<D>) -> Result<(), StepError> {
+        let (contacts, h) = (&self.loads.contacts, self.grid.spacing);
+        for ([one, other], point) in contacts.apart() {
+            let seen = |poses: &[Pose<D>]| poses[other].to_frame(&poses[one].to_space(point));
+            let (shape, ends) = (&contacts.obstacles[other].shape, [seen(start), seen(end)]);
+            if shape.signed_distance(&ends[1]) < 0.0 || entry(shape, &ends, h).is_some() {
+                let names = [one, other].map(|number| contacts.obstacles[number].name.clone());
+                let position = end[one].to_space(point).iter().copied().collect();
+                return Err(StepError::ObstaclesMeet { names, position });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The box through which the surface of a body moves in a step.
+#[derive(Clone, Copy)]
+struct Swept<const D: usize> {
+    low: Vector<f64, D>,
+    high: Vector<f64, D>,
+    /// The motion of one point.
+    motion: Vector<f64, D>,
+    /// The largest difference of another point's motion.
+    spread: f64,
+}
+
+/// The depth, in spacings, of a point that enters an obstacle too deeply or goes through it; `None` for an allowed motion. The point moves
+/// straight between two positions in the frame of the obstacle.
+fn entry<const D: usize>(shape: &Shape<D>, [start, end]: &[Vector<f64, D>; 2], h: f64) -> Option<f64> {
+    let length = (end - start).norm();
+    let before = shape.signed_distance(start);
+    // A positive distance is at most the distance of the surface. NaN stays outside.
+    if before >= length || before.is_nan() {
+        return None;
+    }
+    let (after, normal) = shape.distance_and_normal(end);
+    let depth = -after / h;
+    if before < 0.0 {
+        let turned = after < 0.0 && shape.normal(start).dot(&normal) < 0.0;
+        return turned.then_some(depth);
+    }
+    if depth > DEEPEST_ENTRY {
+        return Some(depth);
+    }
+    let samples = (length / (SAMPLED * h)).ceil().min(MOST_SAMPLES);
+    let at = |sample: f64| shape.signed_distance(&(start + (end - start) * (sample / samples)));
+    let deepest = (1..samples as u32).map(|sample| at(f64::from(sample))).fold(0.0, f64::min);
+    (after >= 0.0 && deepest < 0.0).then_some(-deepest / h)
+}
