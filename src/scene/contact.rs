@@ -110,11 +110,6 @@ impl Scene {
                 self.refuse_free(problems, &format!("{path}.free"));
             }
         }
-        let from_files = self.bodies.iter().enumerate().filter(|(_, body)| body.particles.is_some());
-        for (i, _) in from_files.filter(|_| self.has_contact()) {
-            let allowed = "must be a shape where bodies touch obstacles or each other: they do so at points of the surface of their shape";
-            problems.refuse(&format!("bodies[{i}].particles"), "a file of particles", allowed);
-        }
         if let Some(contact) = &self.contact {
             contact.check(problems, &self.body_names(), dimension);
         }

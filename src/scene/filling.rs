@@ -8,7 +8,9 @@ use crate::grid::{Grid, indices};
 use crate::mechanics::loads::CurveError;
 use crate::mechanics::reference::GridReset;
 use crate::particles::Particles;
-use crate::shape::{Facet, Filling, GridBox, Layout, SURFACE_DEPTH, Shape, around, fill};
+use crate::shape::{
+    CloudPoint, Facet, Filling, GridBox, Layout, SURFACE_DEPTH, Shape, SingleLayer, around, cloud_surface, fill,
+};
 use crate::simulation::Simulation;
 use crate::tensor::Vector;
 use indicatif::BinaryBytes;
@@ -125,15 +127,7 @@ impl<const D: usize> Builder<'_, D> {
         let (h, n) = (grid.spacing, u64::from(filling.boxes_at_surface()));
         let edges = Vector::repeat(h / n as f64);
         let (first, count) = around(grid, shape);
-        // The planes of symmetry: their axis, coordinate and outward normal.
-        let mut planes = Vec::new();
-        for k in 0..D {
-            for (upper, wall, outward) in [(false, grid.origin[k], -1.0), (true, grid.position(grid.cells)[k], 1.0)] {
-                if self.scene.boundary.face(k, upper).motion::<D>(k)?[k].is_some() {
-                    planes.push((k, wall, outward));
-                }
-            }
-        }
+        let planes = self.planes_of_symmetry()?;
         let goes_on = |facet: &Facet<D>| {
             let on = |&(k, wall, outward): &(usize, f64, f64)| {
                 (facet.position[k] - wall).abs() < SURFACE_DEPTH * h && facet.normal[k] * outward > 0.5
@@ -158,6 +152,42 @@ impl<const D: usize> Builder<'_, D> {
         }
         facets.retain(|facet| !goes_on(facet));
         Ok(facets)
+    }
+
+    /// The surface of a body from a file. Bodies of the same nodal field are joined to it.
+    pub fn cloud(&self, number: usize) -> Result<Vec<CloudPoint<D>>, BuildError> {
+        let (particles, fields) = (&self.particles, self.scene.nodal_fields());
+        let body = |p: usize| particles.body[p] as usize;
+        let solid = || (0..particles.len()).filter(|&p| particles.is_solid(p));
+        let (mut own, others): (Vec<usize>, Vec<usize>) =
+            solid().filter(|&p| fields[body(p)] == fields[number]).partition(|&p| body(p) == number);
+        let count = own.len();
+        own.extend(others);
+        let cloud = own.iter().map(|&p| (particles.position[p], particles.volume[p])).collect();
+        let planes: Vec<_> = self.planes_of_symmetry()?.into_iter().map(|(k, wall, _)| (k, wall)).collect();
+        let points = cloud_surface(cloud, count, &planes).map_err(|SingleLayer(p)| {
+            let what = format!(
+                "the particle at {:?} lies in a single layer of particles or alone, where a surface that touches has no normal; give the file \
+                 at least two layers everywhere, or the body a shape",
+                particles.position[own[p]].as_slice()
+            );
+            BuildError::at(format!("bodies[{number}].particles"), what)
+        })?;
+        Ok(points.into_iter().map(|point| CloudPoint { particle: own[point.particle], ..point }).collect())
+    }
+
+    /// The faces of the grid's box that hold the normal component: their axis, coordinate and the sign of the outward normal.
+    fn planes_of_symmetry(&self) -> Result<Vec<(usize, f64, f64)>, CurveError> {
+        let grid = &self.grid;
+        let mut planes = Vec::new();
+        for k in 0..D {
+            for (upper, wall, outward) in [(false, grid.origin[k], -1.0), (true, grid.position(grid.cells)[k], 1.0)] {
+                if self.scene.boundary.face(k, upper).motion::<D>(k)?[k].is_some() {
+                    planes.push((k, wall, outward));
+                }
+            }
+        }
+        Ok(planes)
     }
 }
 

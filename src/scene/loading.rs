@@ -1,24 +1,17 @@
 //! The loads of a scene: body forces, held faces and regions, loads on surfaces.
 
-use super::body::Body;
 use super::boundary::{Face, Table};
 use super::filling::Builder;
-use super::free::surface;
 use super::load::{Loaded, Pressure, Stress, Traction};
 use super::vector::vector;
 use super::{BuildError, Scene};
 use crate::mechanics::loads::{
-    BodyContact, Contacts, Curve, CurveError, ForceField, Gravity, Loads, Motion, Obstacle, Prescribed, Pressing,
-    Rotation, Selection, SurfaceLoad, SurfacePoint,
+    Curve, CurveError, ForceField, Gravity, Loads, Motion, Prescribed, Pressing, Rotation, Selection, SurfaceLoad,
+    SurfacePoint,
 };
-use crate::mechanics::sweep::stride;
 use crate::shape;
 use crate::tensor::Vector;
 use std::sync::Arc;
-
-/// The largest depth of a body in an obstacle at the start, in grid spacings. Surface points of curved bodies lie on planes that leave the
-/// surface by less.
-const DEEPEST_START: f64 = 0.02;
 
 impl Scene {
     /// All loads on surfaces with their paths, tractions first.
@@ -79,132 +72,9 @@ impl<const D: usize> Builder<'_, D> {
         Ok(loads)
     }
 
-    /// The contacts, and points on the whole surface of every body, if there are contacts. Where bodies of one nodal field are joined, there is no
-    /// surface.
-    fn contacts(&mut self, gravity: &Vector<f64, D>) -> Result<Contacts<D>, BuildError> {
-        let scene = self.scene;
-        let mut contacts = Contacts::default();
-        for (i, one) in scene.obstacles.iter().enumerate() {
-            let path = format!("obstacles[{i}]");
-            let (shape, motion) = (one.shape.built(&path)?, one.motion().motion(0)?);
-            let free = one.free.as_ref().map(|free| free.build(&path, &shape, gravity)).transpose()?;
-            let obstacle = Obstacle::new(one.name.clone(), shape, motion, one.stiffness, one.friction);
-            contacts.obstacles.push(Obstacle { free, ..obstacle });
-        }
-        if contacts.has_free_obstacle() {
-            contacts.obstacles.iter_mut().for_each(|one| one.surface = surface(&one.shape));
-        }
-        if let Some(contact) = &scene.contact {
-            let fields = scene.nodal_fields();
-            let count = fields.iter().max().map_or(1, |last| u64::from(last + 1));
-            if count * stride(self.grid.cells[D - 1]) > u64::from(u32::MAX) {
-                let what = format!(
-                    "{count} groups of bodies are too many for {} cells along the last axis",
-                    self.grid.cells[D - 1]
-                );
-                return Err(BuildError::at("contact", what));
-            }
-            contacts.between = Some(BodyContact::new(contact.stiffness, contact.friction, &fields));
-        }
-        let exist = contacts.exist();
-        for (i, body) in scene.bodies.iter().enumerate().filter(|_| exist) {
-            let whole =
-                Loaded { body: &body.name, region: &None, stress: Stress::Pressure(0.0), curve: &None, surface: &None };
-            contacts.points.extend(self.points(&format!("bodies[{i}]"), &whole)?);
-        }
-        let (fields, shapes) = (scene.nodal_fields(), self.shapes());
-        let is_joint = |point: &SurfacePoint<D>| {
-            let (own, x) = (self.particles.body[point.particle] as usize, &self.particles.position[point.particle]);
-            let others = (0..shapes.len()).filter(|&other| other != own && fields[other] == fields[own]);
-            let within = 2.0 * shape::SURFACE_DEPTH * self.grid.spacing;
-            others.filter_map(|other| shapes[other].as_ref()).any(|shape| shape.signed_distance(x) <= within)
-        };
-        mutant!("contact: joints of a group are surfaces": { return Ok(contacts); });
-        contacts.points.retain(|point| !is_joint(point));
-        Ok(contacts)
-    }
-
-    /// The body around the middle of a bounded obstacle, which may lie between particles.
-    fn around(&self, obstacle: &shape::Shape<D>) -> Option<&str> {
-        let (min, max) = obstacle.bounding_box();
-        let middle = Some((min + max) * 0.5).filter(|x| x.iter().all(|x| x.is_finite()))?;
-        let is_around = |body: &&Body| {
-            let shape = body.shape.as_ref().and_then(super::shape::Shape::build::<D>);
-            shape.is_some_and(|shape| shape.signed_distance(&middle) < 0.0)
-        };
-        let bodies = self.scene.bodies.iter().filter(|_| obstacle.signed_distance(&middle) <= 0.0);
-        bodies.filter(is_around).map(|body| body.name.as_str()).next()
-    }
-
-    /// Refuses bodies that start in an obstacle, and a free obstacle and another one that start in each other.
-    pub fn refuse_overlap(&self, contacts: &Contacts<D>) -> Result<(), BuildError> {
-        let obstacles = &contacts.obstacles;
-        let inside = |([_, other], x): &([usize; 2], &Vector<f64, D>)| obstacles[*other].shape.signed_distance(x) < 0.0;
-        if let Some(([one, other], x)) = contacts.apart().find(inside) {
-            let names = [one, other].map(|number| &obstacles[number].name);
-            let what = format!(
-                "the obstacle {:?} starts in the obstacle {:?} at {:?}, and one of them moves freely; move one of the two",
-                names[0],
-                names[1],
-                x.as_slice()
-            );
-            return Err(BuildError::at(format!("obstacles[{one}]"), what));
-        }
-        let (particles, h) = (&self.particles, self.grid.spacing);
-        for (i, obstacle) in obstacles.iter().enumerate() {
-            let depth = |p: usize| -obstacle.shape.signed_distance(&particles.position[p]);
-            let deepest = (0..particles.len()).max_by(|&a, &b| depth(a).total_cmp(&depth(b)));
-            if let Some(p) = deepest.filter(|&p| depth(p) > DEEPEST_START * h) {
-                let body = &self.scene.bodies[particles.body[p] as usize].name;
-                let (x, depth) = (particles.position[p].as_slice(), depth(p) / h);
-                let what = format!(
-                    "body {body:?} starts in the obstacle {:?}: its point at {x:?} is {depth:.3} grid spacings deep, and {DEEPEST_START} \
-                     is allowed; move one of the two",
-                    obstacle.name
-                );
-                return Err(BuildError::at(format!("obstacles[{i}]"), what));
-            }
-            if let Some(body) = self.around(&obstacle.shape) {
-                let what = format!("obstacle {:?} starts inside body {body:?}; move one of the two", obstacle.name);
-                return Err(BuildError::at(format!("obstacles[{i}]"), what));
-            }
-        }
-        Ok(())
-    }
-
-    /// The shape of each body; `None` for a body from a file.
-    fn shapes(&self) -> Vec<Option<shape::Shape<D>>> {
-        self.scene.bodies.iter().map(|body| body.shape.as_ref()?.build::<D>()).collect()
-    }
-
-    /// Refuses bodies that start in each other, where they may touch.
-    pub fn refuse_overlapping_bodies(&self, contacts: &Contacts<D>) -> Result<(), BuildError> {
-        let (particles, h) = (&self.particles, self.grid.spacing);
-        let shapes = self.shapes();
-        for pair in contacts.between.iter().flat_map(|between| &between.pairs) {
-            let [one, other] = pair.bodies;
-            for (inner, outer) in [(one, other), (other, one)] {
-                let Some(shape) = &shapes[outer as usize] else { continue };
-                let depth = |p: usize| -shape.signed_distance(&particles.position[p]);
-                let own = (0..particles.len()).filter(|&p| particles.body[p] == inner);
-                let deepest = own.max_by(|&a, &b| depth(a).total_cmp(&depth(b)));
-                if let Some(p) = deepest.filter(|&p| depth(p) > DEEPEST_START * h) {
-                    let [inner, outer] = [inner, outer].map(|body| &self.scene.bodies[body as usize].name);
-                    let (x, depth) = (particles.position[p].as_slice(), depth(p) / h);
-                    let what = format!(
-                        "body {inner:?} starts in body {outer:?}: its point at {x:?} is {depth:.3} grid spacings deep, and {DEEPEST_START} is \
-                         allowed; move one of the two, or put both in one group of contact.groups"
-                    );
-                    return Err(BuildError::at("contact", what));
-                }
-            }
-        }
-        Ok(())
-    }
-
     /// The points of a loaded surface. With the key `surface`, these are particles of the body; otherwise, new points on the surface of the
     /// shape.
-    fn points(&mut self, path: &str, on: &Loaded<'_>) -> Result<Vec<SurfacePoint<D>>, BuildError> {
+    pub(super) fn points(&mut self, path: &str, on: &Loaded<'_>) -> Result<Vec<SurfacePoint<D>>, BuildError> {
         let mut bodies = self.scene.bodies.iter().enumerate();
         let Some((number, body)) = bodies.find(|(_, body)| body.name == on.body) else { return Ok(Vec::new()) };
         let region = on.region.as_ref().map(|region| region.built(path)).transpose()?;

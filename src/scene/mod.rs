@@ -8,6 +8,7 @@ pub mod accuracy;
 pub mod body;
 pub mod boundary;
 pub mod contact;
+mod contacts;
 pub mod curve;
 mod free;
 pub mod grid;

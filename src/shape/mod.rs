@@ -3,6 +3,7 @@
 mod ball;
 mod block;
 mod bounds;
+mod cloud;
 mod combined;
 mod cone;
 mod cut;
@@ -24,6 +25,7 @@ mod tests;
 
 pub use ball::Ball;
 pub use block::Block;
+pub(crate) use cloud::{CloudPoint, SingleLayer, cloud_holds, cloud_surface};
 pub use combined::{Difference, Intersection, Union};
 pub use cone::Cone;
 pub use cut::Facet;

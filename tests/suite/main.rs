@@ -6,6 +6,7 @@ mod aggregation;
 mod approximation;
 mod between;
 mod carried;
+mod clouds;
 mod contact;
 mod damping;
 mod dilatation;

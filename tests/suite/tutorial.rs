@@ -65,7 +65,7 @@ fn a_reader_does_all_pages_in_one_folder() -> Result<(), Failure> {
     let folder = folder.path();
     let overview = std::fs::read_to_string(in_repository("docs/src/tutorial.md"))?;
     let pages: Vec<&str> = overview.split("](tutorial/").skip(1).filter_map(|rest| rest.split(".md").next()).collect();
-    assert_eq!(pages, ["beam", "membrane", "ring", "rebound", "plasticity", "obstacles", "own_law"]);
+    assert_eq!(pages, ["beam", "membrane", "ring", "rebound", "plasticity", "obstacles", "contact", "own_law"]);
     tutorial::<4>("beam", folder)?;
     let [_, fine, finer, locked, free] = tutorial("membrane", folder)?;
     // The error is of first order, so the values are extrapolated to h = 0, as in the text.
@@ -76,6 +76,7 @@ fn a_reader_does_all_pages_in_one_folder() -> Result<(), Failure> {
     tutorial::<4>("ring", folder)?;
     tutorial::<4>("rebound", folder)?;
     tutorial::<17>("obstacles", folder)?;
+    tutorial::<3>("contact", folder)?;
     let [_, _, coarse, fine, ..] = tutorial::<7>("plasticity", folder)?;
     // The error is of first order, as in the text.
     let extrapolated = 2.0 * fine - coarse;

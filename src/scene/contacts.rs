@@ -1,0 +1,199 @@
+//! The contacts of a scene: its obstacles, and the surfaces of its bodies.
+
+use super::BuildError;
+use super::body::Body;
+use super::filling::Builder;
+use super::free::surface;
+use super::load::{Loaded, Stress};
+use crate::mechanics::facing::{Overlap, overlaps};
+use crate::mechanics::loads::{BodyContact, Contacts, Obstacle, SurfacePoint};
+use crate::mechanics::sweep::stride;
+use crate::shape::{self, CloudPoint, SURFACE_DEPTH, cloud_holds};
+use crate::tensor::Vector;
+
+/// The largest depth of a body in an obstacle at the start, in grid spacings. Surface points of curved bodies lie on planes that leave the
+/// surface by less.
+const DEEPEST_START: f64 = 0.02;
+
+impl<const D: usize> Builder<'_, D> {
+    /// The contacts, and points on the whole surface of every body, if there are contacts. Where bodies of one nodal field are joined, there is no
+    /// surface.
+    pub(super) fn contacts(&mut self, gravity: &Vector<f64, D>) -> Result<Contacts<D>, BuildError> {
+        let scene = self.scene;
+        let mut contacts = Contacts::default();
+        for (i, one) in scene.obstacles.iter().enumerate() {
+            let path = format!("obstacles[{i}]");
+            let (shape, motion) = (one.shape.built(&path)?, one.motion().motion(0)?);
+            let free = one.free.as_ref().map(|free| free.build(&path, &shape, gravity)).transpose()?;
+            let obstacle = Obstacle::new(one.name.clone(), shape, motion, one.stiffness, one.friction);
+            contacts.obstacles.push(Obstacle { free, ..obstacle });
+        }
+        if contacts.has_free_obstacle() {
+            contacts.obstacles.iter_mut().for_each(|one| one.surface = surface(&one.shape));
+        }
+        if let Some(contact) = &scene.contact {
+            let fields = scene.nodal_fields();
+            let count = fields.iter().max().map_or(1, |last| u64::from(last + 1));
+            if count * stride(self.grid.cells[D - 1]) > u64::from(u32::MAX) {
+                let what = format!(
+                    "{count} groups of bodies are too many for {} cells along the last axis",
+                    self.grid.cells[D - 1]
+                );
+                return Err(BuildError::at("contact", what));
+            }
+            contacts.between = Some(BodyContact::new(contact.stiffness, contact.friction, &fields));
+        }
+        let exist = contacts.exist();
+        for (i, body) in scene.bodies.iter().enumerate().filter(|_| exist) {
+            let whole =
+                Loaded { body: &body.name, region: &None, stress: Stress::Pressure(0.0), curve: &None, surface: &None };
+            let points = if body.shape.is_some() {
+                self.points(&format!("bodies[{i}]"), &whole)?
+            } else {
+                self.cloud_points(i)?
+            };
+            contacts.points.extend(points);
+        }
+        let (fields, shapes) = (scene.nodal_fields(), self.shapes());
+        let is_joint = |point: &SurfacePoint<D>| {
+            let (own, x) = (self.particles.body[point.particle] as usize, &self.particles.position[point.particle]);
+            let others = (0..shapes.len()).filter(|&other| other != own && fields[other] == fields[own]);
+            let within = 2.0 * SURFACE_DEPTH * self.grid.spacing;
+            others.filter_map(|other| shapes[other].as_ref()).any(|shape| shape.signed_distance(x) <= within)
+        };
+        mutant!("contact: joints of a group are surfaces": { return Ok(contacts); });
+        contacts.points.retain(|point| !is_joint(point));
+        Ok(contacts)
+    }
+
+    /// New points on the surface of a body from a file.
+    fn cloud_points(&mut self, number: usize) -> Result<Vec<SurfacePoint<D>>, BuildError> {
+        let surface = self.cloud(number)?;
+        self.make_room(&format!("bodies[{number}].particles"), surface.len())?;
+        let mut points = Vec::new();
+        for CloudPoint { particle, position, normal, area } in surface {
+            points.push(SurfacePoint { particle: self.particles.len(), normal, area });
+            let velocity = self.particles.velocity.get(particle).copied().unwrap_or_else(Vector::zeros);
+            // The particles of a file may lie nearer to the box than half their edge.
+            let depth = SURFACE_DEPTH * self.grid.spacing;
+            let [lower, upper] = [self.grid.origin, self.grid.position(self.grid.cells)];
+            let below = position - normal * depth;
+            let x = Vector::from_fn(|k, _| below[k].clamp(lower[k] + depth, upper[k] - depth));
+            self.push(x, velocity, 0.0, 0.0, number);
+        }
+        Ok(points)
+    }
+
+    /// The body around the middle of a bounded obstacle, which may lie between particles.
+    fn around(&self, obstacle: &shape::Shape<D>) -> Option<&str> {
+        let (min, max) = obstacle.bounding_box();
+        let middle = Some((min + max) * 0.5).filter(|x| x.iter().all(|x| x.is_finite()))?;
+        let is_around = |body: &&Body| {
+            let shape = body.shape.as_ref().and_then(super::shape::Shape::build::<D>);
+            shape.is_some_and(|shape| shape.signed_distance(&middle) < 0.0)
+        };
+        let bodies = self.scene.bodies.iter().filter(|_| obstacle.signed_distance(&middle) <= 0.0);
+        bodies.filter(is_around).map(|body| body.name.as_str()).next()
+    }
+
+    /// Refuses bodies that start in an obstacle, and a free obstacle and another one that start in each other.
+    pub fn refuse_overlap(&self, contacts: &Contacts<D>) -> Result<(), BuildError> {
+        let obstacles = &contacts.obstacles;
+        let inside = |([_, other], x): &([usize; 2], &Vector<f64, D>)| obstacles[*other].shape.signed_distance(x) < 0.0;
+        if let Some(([one, other], x)) = contacts.apart().find(inside) {
+            let names = [one, other].map(|number| &obstacles[number].name);
+            let what = format!(
+                "the obstacle {:?} starts in the obstacle {:?} at {:?}, and one of them moves freely; move one of the two",
+                names[0],
+                names[1],
+                x.as_slice()
+            );
+            return Err(BuildError::at(format!("obstacles[{one}]"), what));
+        }
+        let (particles, h) = (&self.particles, self.grid.spacing);
+        for (i, obstacle) in obstacles.iter().enumerate() {
+            let depth = |p: usize| -obstacle.shape.signed_distance(&particles.position[p]);
+            let deepest = (0..particles.len()).max_by(|&a, &b| depth(a).total_cmp(&depth(b)));
+            if let Some(p) = deepest.filter(|&p| depth(p) > DEEPEST_START * h) {
+                let body = &self.scene.bodies[particles.body[p] as usize].name;
+                let (x, depth) = (particles.position[p].as_slice(), depth(p) / h);
+                let what = format!(
+                    "body {body:?} starts in the obstacle {:?}: its point at {x:?} is {depth:.3} grid spacings deep, and {DEEPEST_START} \
+                     is allowed; move one of the two",
+                    obstacle.name
+                );
+                return Err(BuildError::at(format!("obstacles[{i}]"), what));
+            }
+            if let Some(body) = self.around(&obstacle.shape) {
+                let what = format!("obstacle {:?} starts inside body {body:?}; move one of the two", obstacle.name);
+                return Err(BuildError::at(format!("obstacles[{i}]"), what));
+            }
+        }
+        Ok(())
+    }
+
+    /// The shape of each body; `None` for a body from a file.
+    fn shapes(&self) -> Vec<Option<shape::Shape<D>>> {
+        self.scene.bodies.iter().map(|body| body.shape.as_ref()?.build::<D>()).collect()
+    }
+
+    /// Refuses bodies that start in each other, where they may touch.
+    pub fn refuse_overlapping_bodies(&self, contacts: &Contacts<D>) -> Result<(), BuildError> {
+        for pair in contacts.between.iter().flat_map(|between| &between.pairs) {
+            let [one, other] = pair.bodies;
+            for (inner, outer) in [(one, other), (other, one)] {
+                if let Some((p, how)) = self.inside(inner, outer) {
+                    let [inner, outer] = [inner, outer].map(|body| &self.scene.bodies[body as usize].name);
+                    let what = format!(
+                        "body {inner:?} starts in body {outer:?}: its point at {:?} is {how}; move one of the two, or put both in one group of \
+                         contact.groups",
+                        self.particles.position[p].as_slice()
+                    );
+                    return Err(BuildError::at("contact", what));
+                }
+            }
+        }
+        let Some(between) = &contacts.between else { return Ok(()) };
+        self.refuse_touching_clouds(contacts, between)
+    }
+
+    /// A particle of the body `inner` that lies in the body `outer`, and how deep.
+    fn inside(&self, inner: u32, outer: u32) -> Option<(usize, String)> {
+        let (particles, h) = (&self.particles, self.grid.spacing);
+        let of = |body: u32| (0..particles.len()).filter(move |&p| particles.body[p] == body);
+        let Some(shape) = self.scene.bodies[outer as usize].shape.as_ref().and_then(super::shape::Shape::build::<D>)
+        else {
+            let solid = of(outer).filter(|&p| particles.is_solid(p));
+            let holds = cloud_holds(solid.map(|p| (particles.position[p], particles.volume[p])).collect());
+            let p = of(inner).find(|&p| particles.is_solid(p) && holds(&particles.position[p]))?;
+            return Some((p, "between its particles".to_owned()));
+        };
+        let depth = |p: usize| -shape.signed_distance(&particles.position[p]);
+        let deepest = of(inner).max_by(|&a, &b| depth(a).total_cmp(&depth(b)))?;
+        let allowed = format!("{:.3} grid spacings deep, and {DEEPEST_START} is allowed", depth(deepest) / h);
+        (depth(deepest) > DEEPEST_START * h).then_some((deepest, allowed))
+    }
+
+    /// Refuses a body from a file whose surface starts in another surface.
+    fn refuse_touching_clouds(&self, contacts: &Contacts<D>, between: &BodyContact<D>) -> Result<(), BuildError> {
+        let (bodies, particles, h) = (&self.scene.bodies, &self.particles, self.grid.spacing);
+        let positions: Vec<_> = contacts.points.iter().map(|point| particles.position[point.particle]).collect();
+        let of = |pair: usize| between.pairs[pair].bodies.map(|body| &bodies[body as usize]);
+        let touches =
+            |one: &Overlap| one.depth > DEEPEST_START * h && of(one.pair).iter().any(|body| body.shape.is_none());
+        let overlaps = overlaps(contacts, between, particles, &self.grid, &positions).into_iter().filter(touches);
+        let Some(Overlap { number, pair, depth }) = overlaps.max_by(|one, other| one.depth.total_cmp(&other.depth))
+        else {
+            return Ok(());
+        };
+        let [one, other] = of(pair).map(|body| &body.name);
+        let what = format!(
+            "bodies {one:?} and {other:?} start in each other: their surfaces overlap by {:.3} grid spacings at {:?}, and {DEEPEST_START} \
+             is allowed; the surface of particles from a file lies half their edge outside them; move one of the two, or put both in one \
+             group of contact.groups",
+            depth / h,
+            positions[number].as_slice()
+        );
+        Err(BuildError::at("contact", what))
+    }
+}
