@@ -62,11 +62,12 @@ impl<const D: usize> Tangent<'_, D> {
     fn probe(&self, at: &At<f64, D, D>, gradient: &Tensor<f64, D>, mut take: impl FnMut(usize, At<f64, D, D>)) {
         let along = Along::Gradient(gradient);
         let terms: Vec<_> = self.terms.iter().filter_map(|term| Some(term.product_at_points(along)?.1)).collect();
-        self.supports.each_group(|group| {
+        let evaluate = |group: Group<'_>| {
             let mut sums = At::<f64, D, D>::zero();
             terms.iter().for_each(|add| add(group, at, &mut sums));
-            take(group.number, sums);
-        });
+            sums
+        };
+        self.supports.map_groups(evaluate, |group, sums| take(group.number, sums));
     }
 
     /// The cell of each particle of a group in the form; `None` for empty lanes and for surface points, which belong to no cell. Adds new

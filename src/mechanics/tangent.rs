@@ -100,20 +100,25 @@ impl<const D: usize> Tangent<'_, D> {
     }
 
     /// Corrects the blocks of inner nodes for the outer nodes that follow them.
-    fn add_followers(&self, quadratic: &dyn Fn(Group<'_>, &mut Quadratic), blocks: &mut [Tensor<f64, D>]) {
+    fn add_followers(&self, quadratic: &(dyn Fn(Group<'_>, &mut Quadratic) + Sync), blocks: &mut [Tensor<f64, D>]) {
         mutant!("unknowns: the diagonal blocks lack the nodes that follow": { return; });
         if self.unknowns.followers.is_empty() {
             return;
         }
         let reached = self.unknowns.reached(self.supports);
-        self.supports.each_group(|group| {
+        let corrections = |group: Group<'_>| {
+            let mut added = Vec::new();
             if group.particles.iter().any(|&p| reached[p as usize]) {
                 let mut form = Quadratic::zero();
                 quadratic(group, &mut form);
                 for (lane, &p) in group.particles.iter().enumerate().filter(|(_, p)| reached[**p as usize]) {
-                    self.unknowns.add_followers(self.supports, p as usize, &form, lane, blocks);
+                    self.unknowns.add_followers(self.supports, p as usize, &form, lane, &mut added);
                 }
             }
+            added
+        };
+        self.supports.map_groups(corrections, |_, added| {
+            added.into_iter().for_each(|(node, block)| blocks[node] += block);
         });
     }
 }

@@ -175,23 +175,22 @@ impl<'a, const D: usize> Unknowns<'a, D> {
         reached
     }
 
-    /// Corrects the diagonal blocks of a quadratic form at one particle: effective shape functions replace N and ∇N.
+    /// Adds corrections of the diagonal blocks of a quadratic form at one particle: effective shape functions replace N and ∇N.
     pub(crate) fn add_followers(
         &self,
         supports: &Supports<D>,
         particle: usize,
         form: &Quadratic,
         lane: usize,
-        blocks: &mut [Tensor<f64, D>],
+        added: &mut Vec<(usize, Tensor<f64, D>)>,
     ) {
         for (node, function) in self.functions(supports, particle) {
-            for i in 0..D {
-                let whole = form.block(lane, function.value[i], &function.gradient[i]);
-                (0..D).for_each(|k| blocks[node][(i, k)] += whole[(i, k)]);
-            }
+            let rows: [Tensor<f64, D>; D] =
+                std::array::from_fn(|i| form.block(lane, function.value[i], &function.gradient[i]));
+            added.push((node, Tensor::from_fn(|i, k| rows[i][(i, k)])));
         }
         for (node, n, grad_n) in supports.of(particle) {
-            blocks[node] -= form.block(lane, n, &grad_n);
+            added.push((node, -form.block(lane, n, &grad_n)));
         }
     }
 

@@ -156,6 +156,15 @@ impl<const D: usize> Plain<D> {
         self.in_order(|group| evaluate(group, &self.gathered(group, fields, field)), take);
     }
 
+    /// Calls `take(group, evaluate(group))` for every group in order.
+    pub(super) fn map_groups<R: Send>(
+        &self,
+        evaluate: &(dyn Fn(Group<'_>) -> R + Sync),
+        take: &mut dyn FnMut(Group<'_>, R),
+    ) {
+        self.in_order(evaluate, take);
+    }
+
     pub(super) fn fill_rows(&self, field: &[f64], count: usize, rows: &mut [[f64; LANES]], fill: &Fill<'_, D>) {
         let evaluate = |group: Group<'_>| {
             let mut rows = vec![[0.0; LANES]; count];

@@ -295,6 +295,15 @@ impl<const D: usize> Supports<D> {
         either!(self, way => way.each_group(&mut visit));
     }
 
+    /// Calls `take(group, evaluate(group))` for all groups, in the order of their numbers.
+    pub(crate) fn map_groups<R: Send>(
+        &self,
+        evaluate: impl Fn(Group<'_>) -> R + Sync,
+        mut take: impl FnMut(Group<'_>, R),
+    ) {
+        either!(self, way => way.map_groups(&evaluate, &mut take));
+    }
+
     /// Number of groups.
     pub(crate) fn groups(&self) -> usize {
         either!(self, way => way.groups())

@@ -28,6 +28,9 @@ type Work<'a, S> = dyn Fn(&Block, &mut S, &mut [f64]) + Sync + 'a;
 /// `(block, buffer, first, slab)`: adds the buffer's entries at the active nodes of the slab, which begins at the node `first`.
 type Add<'a> = dyn Fn(&Block, &[f64], usize, &mut [f64]) + Sync + 'a;
 
+/// `(scratch, block, take)`: takes each group of a block with its result.
+type Evaluated<'a, S, R> = dyn Fn(&mut S, &Block, &mut dyn FnMut(Group<'_>, R)) + Sync + 'a;
+
 impl<const D: usize> Tiled<D> {
     fn in_parallel(&self) -> bool {
         parallel::several() && self.groups() >= PARALLEL
@@ -145,7 +148,7 @@ impl<const D: usize> Tiled<D> {
         }
     }
 
-    /// Calls `take(group, evaluate(group, u and L))` for every group in order. At most the results of one wave wait in memory.
+    /// Calls `take(group, evaluate(group, u and L))` for every group in order.
     pub(super) fn gather<R: Send, const C: usize>(
         &self,
         fields: usize,
@@ -157,8 +160,25 @@ impl<const D: usize> Tiled<D> {
         let one = |scratch: &mut Scratch<C, D>, block: &Block, take: &mut dyn FnMut(Group<'_>, R)| {
             gathered(block, field, fields, mode, scratch, |group, at| take(group, evaluate(group, at)));
         };
+        self.in_order(&one, take);
+    }
+
+    /// Calls `take(group, evaluate(group))` for every group in order.
+    pub(super) fn map_groups<R: Send>(
+        &self,
+        evaluate: &(dyn Fn(Group<'_>) -> R + Sync),
+        take: &mut dyn FnMut(Group<'_>, R),
+    ) {
+        let one = |(): &mut (), block: &Block, take: &mut dyn FnMut(Group<'_>, R)| {
+            (0..block.len()).for_each(|group| take(block.group(group), evaluate(block.group(group))));
+        };
+        self.in_order(&one, take);
+    }
+
+    /// Evaluates all blocks by `one`, and takes the results of their groups in order. At most the results of one wave wait in memory.
+    fn in_order<S: Default + Send, R: Send>(&self, one: &Evaluated<'_, S, R>, take: &mut dyn FnMut(Group<'_>, R)) {
         if !self.in_parallel() {
-            let mut scratch = Scratch::default();
+            let mut scratch = S::default();
             self.blocks.iter().for_each(|block| one(&mut scratch, block, take));
             return;
         }

@@ -3,13 +3,18 @@
 //! with Q ≈ Π_axes ([1 4 1]/6)⁻¹ amplifies them: M = D⁻¹ + D^{−½} Q Qᵀ D^{−½} takes the place of D⁻¹.
 
 use super::form::LocalForm;
-use crate::tensor::Tensor;
+use crate::parallel;
+use crate::solver::vector::{axpy, update};
+use crate::tensor::{Tensor, Vector};
 use std::collections::HashMap;
 
 /// Steps of the Chebyshev iteration for ([1 4 1]/6)⁻¹.
 const STEPS: usize = 3;
 /// Bounds of the eigenvalues of [1 4 1]/6.
 const SPECTRUM: [f64; 2] = [1.0 / 3.0, 1.0];
+
+/// Nodes in one part of the work of a thread.
+const PART: usize = 2048;
 
 /// The number of a neighbour that does not exist.
 const NONE: u32 = u32::MAX;
@@ -53,10 +58,12 @@ impl Filter {
     /// z += D^{−½} Q Qᵀ D^{−½} r
     pub fn add<const D: usize>(&self, r: &[f64], z: &mut [f64]) {
         mutant!("multigrid: cubic splines have no filter": { return; });
-        let mut x: Vec<f64> = r.iter().zip(&self.scale).map(|(r, scale)| r * scale).collect();
+        let mut x = r.to_vec();
+        update(&self.scale, &mut x, |scale, r| r * scale);
         (0..D).rev().for_each(|axis| self.invert::<D>(axis, &mut x));
         (0..D).for_each(|axis| self.invert::<D>(axis, &mut x));
-        z.iter_mut().zip(&x).zip(&self.scale).for_each(|((z, x), scale)| *z += x * scale * self.unit);
+        update(&self.scale, &mut x, |scale, x| x * scale * self.unit);
+        axpy(1.0, &x, z);
     }
 
     /// x ← q(B) x with B = [1 4 1]/6 along an axis and the polynomial q ≈ 1/B.
@@ -65,25 +72,28 @@ impl Filter {
         let (theta, delta) = (0.5 * (upper + lower), 0.5 * (upper - lower));
         let sigma = theta / delta;
         let (mut r, mut rho) = (x.to_vec(), 1.0 / sigma);
-        let mut p: Vec<f64> = r.iter().map(|r| r / theta).collect();
-        x.copy_from_slice(&p);
+        update(&r, x, |r, _| r / theta);
+        let mut p = x.to_vec();
         for _ in 1..STEPS {
             self.subtract_product::<D>(axis, &p, &mut r);
             let next = 1.0 / (2.0 * sigma - rho);
-            p.iter_mut().zip(&r).for_each(|(p, r)| *p = next * rho * *p + 2.0 * next / delta * r);
-            x.iter_mut().zip(&p).for_each(|(x, p)| *x += p);
+            update(&r, &mut p, |r, p| next * rho * p + 2.0 * next / delta * r);
+            axpy(1.0, &p, x);
             rho = next;
         }
     }
 
     /// r −= B p
     fn subtract_product<const D: usize>(&self, axis: usize, p: &[f64], r: &mut [f64]) {
-        for (node, beside) in self.beside[axis].iter().enumerate() {
-            for i in 0..D {
-                let others: f64 =
-                    beside.iter().filter(|&&other| other != NONE).map(|&other| p[other as usize * D + i]).sum();
-                r[node * D + i] -= (4.0 * p[node * D + i] + others) / 6.0;
+        let p: &[Vector<f64, D>] = bytemuck::cast_slice(p);
+        let r: &mut [Vector<f64, D>] = bytemuck::cast_slice_mut(r);
+        let parts = r.chunks_mut(PART).zip(p.chunks(PART)).zip(self.beside[axis].chunks(PART));
+        parallel::for_each(parts, &|((r, own), beside): ((&mut [_], &[_]), &[[u32; 2]])| {
+            for ((r, own), beside) in r.iter_mut().zip(own).zip(beside) {
+                let others = beside.iter().filter(|&&other| other != NONE);
+                let others = others.fold(Vector::zeros(), |sum: Vector<f64, D>, &other| sum + p[other as usize]);
+                *r -= (own * 4.0 + others) / 6.0;
             }
-        }
+        });
     }
 }

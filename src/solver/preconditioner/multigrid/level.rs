@@ -1,6 +1,7 @@
 //! A coarse grid: hat functions, the tangent on them as stencils, restriction to the grid and interpolation from it.
 
 use super::form::LocalForm;
+use super::interpolation::Interpolation;
 use crate::aggregation::{Extension, Followers, Occupied, Pieces};
 use crate::parallel;
 use crate::solver::LinearOperator;
@@ -22,8 +23,8 @@ const NONE: u32 = u32::MAX;
 /// A coarse level, stored as a stencil of 3^D blocks for each node.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Level<const D: usize> {
-    /// P: each node of the finer level as a weighted sum of nodes of this level.
-    finer: Vec<Vec<(u32, f64)>>,
+    /// P, from this level to the finer one.
+    interpolation: Interpolation,
     /// Whether a value of the finer level is no unknown.
     fixed_finer: Vec<bool>,
     /// Whether a value of this level is zero, because it is prescribed or no cell reaches it.
@@ -65,18 +66,6 @@ impl<const D: usize> Level<D> {
     }
 }
 
-/// The nodes of the grid of twice the spacing from which the node `index` is interpolated, with weights. Where an index is odd, the node lies
-/// halfway between two coarse nodes.
-fn between<const D: usize>(index: [u32; 3]) -> impl Iterator<Item = ([u32; 3], f64)> {
-    let upper = |corner: u32, k: usize| corner >> k & 1;
-    let odd = (0..D).filter(|&k| index[k] % 2 == 1).count();
-    let corners = (0..1 << D).filter(move |&corner| (0..D).all(|k| upper(corner, k) <= index[k] % 2));
-    corners.map(move |corner| {
-        let node = std::array::from_fn(|k| if k < D { index[k] / 2 + upper(corner, k) } else { 0 });
-        (node, 0.5_f64.powi(odd as i32))
-    })
-}
-
 /// The place of the node `to` in the stencil of the node `from`.
 fn place(from: [u32; 3], to: [u32; 3]) -> usize {
     let [x, y, z] = [0, 1, 2].map(|k| (to[k] + 1 - from[k]) as usize);
@@ -86,19 +75,8 @@ fn place(from: [u32; 3], to: [u32; 3]) -> usize {
 impl<const D: usize> Level<D> {
     /// The next coarser level of a form, and the form of that level.
     pub fn of(form: &LocalForm) -> (Self, LocalForm) {
-        let mut next = LocalForm { grid: form.grid.map(|cells| cells.div_ceil(2)), ..LocalForm::default() };
-        let mut numbers: HashMap<[u32; 3], u32> = HashMap::new();
-        let mut finer = Vec::with_capacity(form.nodes.len());
-        for &index in &form.nodes {
-            let list = between::<D>(index).map(|(coarse, weight)| {
-                let number = *numbers.entry(coarse).or_insert_with(|| {
-                    next.nodes.push(coarse);
-                    next.nodes.len() as u32 - 1
-                });
-                (number, weight)
-            });
-            finer.push(list.collect());
-        }
+        let (interpolation, nodes, numbers) = Interpolation::to::<D>(&form.nodes);
+        let mut next = LocalForm { grid: form.grid.map(|cells| cells.div_ceil(2)), nodes, ..LocalForm::default() };
         let neighbour = |index: [u32; 3], place: usize| {
             let steps = [place % 3, place / 3 % 3, place / 9];
             let to = [0, 1, 2].map(|k| (index[k] + steps[k] as u32).checked_sub(1).unwrap_or(NONE));
@@ -106,11 +84,11 @@ impl<const D: usize> Level<D> {
         };
         let neighbours = next.nodes.iter().map(|&index| std::array::from_fn(|place| neighbour(index, place)));
         let mut level = Self {
-            held: Self::held(form, &finer, next.nodes.len()),
+            held: Self::held(form, &interpolation, next.nodes.len()),
             neighbours: neighbours.collect(),
             entries: vec![[Tensor::zeros(); 27]; next.nodes.len()],
             fixed_finer: form.fixed(),
-            finer,
+            interpolation,
             ..Self::default()
         };
         let of_coarse = form.add_cells_to::<D>(&mut next);
@@ -129,17 +107,17 @@ impl<const D: usize> Level<D> {
 
     /// The held values of the coarse level. A coarse node that coincides with a finer node is held where that node is prescribed. Any other
     /// coarse node is held where one of the finer nodes interpolated from it is prescribed.
-    fn held(form: &LocalForm, finer: &[Vec<(u32, f64)>], count: usize) -> Vec<bool> {
+    fn held(form: &LocalForm, interpolation: &Interpolation, count: usize) -> Vec<bool> {
         let (mut held, mut same) = (vec![false; D * count], vec![false; count]);
-        for (fine, list) in finer.iter().enumerate() {
-            if let [(coarse, _)] = list[..] {
+        for (fine, (list, _)) in interpolation.rows().enumerate() {
+            if let &[coarse] = list {
                 same[coarse as usize] = true;
                 (0..D).for_each(|i| held[coarse as usize * D + i] = form.prescribed[fine * D + i]);
                 mutant!("multigrid: coarse nodes that are held move": { (0..D).for_each(|i| held[coarse as usize * D + i] = false); });
             }
         }
-        for (fine, list) in finer.iter().enumerate() {
-            for &(coarse, _) in list.iter().filter(|(coarse, _)| !same[*coarse as usize]) {
+        for (fine, (list, _)) in interpolation.rows().enumerate() {
+            for &coarse in list.iter().filter(|coarse| !same[**coarse as usize]) {
                 (0..D).for_each(|i| held[coarse as usize * D + i] |= form.prescribed[fine * D + i]);
             }
         }
@@ -150,12 +128,12 @@ impl<const D: usize> Level<D> {
     fn add_nodes(&mut self, form: &LocalForm, next: &mut LocalForm) {
         let mut lumped = vec![Tensor::<f64, D>::zeros(); next.nodes.len()];
         let blocks: &[Tensor<f64, D>] = bytemuck::cast_slice(&form.blocks);
-        for (list, own) in self.finer.iter().zip(blocks) {
-            for &(a, of_a) in list {
-                lumped[a as usize] += own * of_a;
-                for &(b, of_b) in list {
+        for ((list, weight), own) in self.interpolation.rows().zip(blocks) {
+            for &a in list {
+                lumped[a as usize] += own * weight;
+                for &b in list {
                     let at = place(next.nodes[a as usize], next.nodes[b as usize]);
-                    self.entries[a as usize][at] += own * (of_a * of_b);
+                    self.entries[a as usize][at] += own * (weight * weight);
                 }
             }
         }
@@ -287,22 +265,11 @@ impl<const D: usize> Level<D> {
         multiply_blocks(&self.inverse, r, z);
     }
 
-    /// Calls `visit` with the entries of P: a value of the finer level that is an unknown, a value of this level, and the weight.
-    fn each_weight(&self, mut visit: impl FnMut(usize, usize, f64)) {
-        for (fine, list) in self.finer.iter().enumerate() {
-            for &(coarse, weight) in list {
-                for i in (0..D).filter(|i| !self.fixed_finer[fine * D + i]) {
-                    visit(fine * D + i, coarse as usize * D + i, weight);
-                }
-            }
-        }
-    }
-
     /// Eᵀ Pᵀ r
     pub fn restrict(&self, r: &[f64]) -> Vec<f64> {
-        let mut out = vec![0.0; D * self.neighbours.len()];
-        self.each_weight(|fine, coarse, weight| out[coarse] += weight * r[fine]);
-        self.followers.restrict::<f64>(bytemuck::cast_slice_mut(&mut out));
+        let mut out = self.interpolation.restrict::<D>(&self.fixed_finer, bytemuck::cast_slice(r));
+        self.followers.restrict::<f64>(&mut out);
+        let mut out = bytemuck::allocation::cast_vec(out);
         out.iter_mut().zip(&self.held).filter(|(_, held)| **held).for_each(|(out, _)| *out = 0.0);
         out
     }
@@ -310,6 +277,7 @@ impl<const D: usize> Level<D> {
     /// x += P E y
     pub fn prolong(&self, mut y: Vec<f64>, x: &mut [f64]) {
         self.followers.extend::<f64>(bytemuck::cast_slice_mut(&mut y));
-        self.each_weight(|fine, coarse, weight| x[fine] += weight * y[coarse]);
+        let (y, x) = (bytemuck::cast_slice(&y), bytemuck::cast_slice_mut(x));
+        self.interpolation.prolong::<D>(&self.fixed_finer, y, x);
     }
 }

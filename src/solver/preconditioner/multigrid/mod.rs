@@ -9,6 +9,7 @@
 
 mod filter;
 mod form;
+mod interpolation;
 mod level;
 mod rigid;
 
@@ -40,10 +41,11 @@ pub struct Multigrid<const D: usize> {
 /// Bytes of the coarse levels for a finest level of `nodes` nodes, and of the [`LocalForm`] that they are made from.
 pub(crate) fn bytes(nodes: usize, dimension: usize) -> usize {
     let (block, tangent) = (dimension.pow(2) * size_of::<f64>(), dimension.pow(4) * size_of::<f64>());
-    let transfer = 1.5_f64.powi(dimension as i32).ceil() as usize * size_of::<(u32, f64)>();
+    // Interpolation and its transpose: 1.5^D coarse nodes for a node.
+    let transfer = 2 * 1.5_f64.powi(dimension as i32).ceil() as usize * size_of::<u32>();
     // Coarse grids have a half more nodes than the share 1/2^D, because of surfaces.
     let coarse = 2 * nodes.div_ceil(1 << dimension);
-    nodes * (tangent + transfer + size_of::<Vec<u32>>()) + coarse * (28 * block + 27 * size_of::<u32>())
+    nodes * (tangent + transfer + size_of::<u32>()) + coarse * (28 * block + 27 * size_of::<u32>())
 }
 
 impl<const D: usize> Multigrid<D> {
