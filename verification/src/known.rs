@@ -114,7 +114,7 @@ pub const KNOWN: &[Known] = &[
               stress. From 8 to 16 cells the order is 2.7.",
         since: "24 November 2026",
         factor: 1.2,
-        cells: &[short_effort(&["stress, round hole", "not-a-knot cubic", "Gauss"], 1.4441)],
+        cells: &[full_effort(&["stress, round hole", "not-a-knot cubic", "Gauss"], 1.4441)],
     },
     Known {
         study: "order",
@@ -123,7 +123,7 @@ pub const KNOWN: &[Known] = &[
               found.",
         since: "24 November 2026",
         factor: 1.2,
-        cells: &[short_effort(&["error of the hole, ring", "cubic"], 2.67e-5)],
+        cells: &[full_effort(&["error of the hole, ring", "cubic"], 2.67e-5)],
     },
     Known {
         study: "symmetry",

@@ -2,15 +2,18 @@
 
 use clap::{Parser, ValueEnum};
 use serde_json::{Value, json};
+use std::collections::HashMap;
 use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc;
 use std::time::{Instant, SystemTime};
 use verification::known::may_list;
 use verification::record::{self, Finding, Run};
 use verification::report::{chain, stop_at_failures};
-use verification::studies::{Effort, Outcome, PAPER, STUDIES, Study, StudyError};
+use verification::studies::{Effort, MEASURE_TIME, Outcome, PAPER, STUDIES, Study, StudyError};
 
 /// Verification of bfree.
 #[derive(Parser)]
@@ -112,7 +115,7 @@ fn writing(place: impl Into<String>) -> impl FnOnce(io::Error) -> Failure {
     move |source| Failure { place: place.into(), source }
 }
 
-fn run(studies: &[(&Study, Effort)], arguments: &Arguments) -> Result<bool, Failure> {
+fn run(studies: &[(&'static Study, Effort)], arguments: &Arguments) -> Result<bool, Failure> {
     let mut out = io::stdout().lock();
     // This check precedes hours of work. It records the tree before the run writes to it.
     let of_run = if asked_for(arguments, "full") {
@@ -124,28 +127,14 @@ fn run(studies: &[(&Study, Effort)], arguments: &Arguments) -> Result<bool, Fail
     let mut findings: Vec<Finding> = Vec::new();
     let mut documents = Vec::new();
     let mut chapters = Vec::new();
-    for &(study, effort) in studies {
-        let start = Instant::now();
-        stop_at_failures((arguments.first && study.name != "mutants").then_some(may_list));
-        let result = study.run(effort);
-        let seconds = start.elapsed().as_secs_f64();
-        let before = text.len();
-        print(&mut text, study, &result, seconds).map_err(writing("the results"))?;
-        out.write_all(&text[before..]).map_err(writing("to standard output"))?;
-        if let (Ok(outcome), Some(directory)) = (&result, &arguments.out) {
-            draw(directory, outcome)?;
-        }
-        chapters.push(chapter(study, &result, seconds, "results"));
-        if let (Ok(outcome), true) = (&result, asked_for(arguments, "results")) {
-            draw(&kept_folder("results"), outcome)?;
-        }
-        if let (Ok(_), "tradeoff", Effort::Full) = (&result, study.name, effort) {
-            keep_tradeoff(&chapter(study, &result, seconds, "tradeoff"))?;
-        }
-        let finding = Finding::of(study.name, &result, seconds);
-        documents.push(document(&finding, &result));
-        findings.push(finding);
-    }
+    each_in_order(studies, arguments, |done| {
+        out.write_all(&done.text).map_err(writing("to standard output"))?;
+        text.extend(done.text);
+        chapters.push(done.chapter);
+        documents.push(done.document);
+        findings.push(done.finding);
+        Ok(())
+    })?;
     let passed = findings.iter().all(|finding| finding.passed);
     let summary = format!("\n=== verdict ===\n{}", record::summary(&findings));
     text.extend_from_slice(summary.as_bytes());
@@ -162,6 +151,78 @@ fn run(studies: &[(&Study, Effort)], arguments: &Arguments) -> Result<bool, Fail
         fs::write(path, text).map_err(writing(path.display().to_string()))?;
     }
     Ok(passed)
+}
+
+/// What is kept of a study.
+struct Done {
+    /// What the program prints.
+    text: Vec<u8>,
+    chapter: String,
+    document: Value,
+    finding: Finding,
+}
+
+/// Runs a study, and writes its pictures.
+fn done((study, effort): (&Study, Effort), arguments: &Arguments) -> Result<Done, Failure> {
+    let start = Instant::now();
+    stop_at_failures((arguments.first && study.name != "mutants").then_some(may_list));
+    let result = study.run(effort);
+    let seconds = start.elapsed().as_secs_f64();
+    let mut text = Vec::new();
+    print(&mut text, study, &result, seconds).map_err(writing("the results"))?;
+    if let (Ok(outcome), Some(directory)) = (&result, &arguments.out) {
+        draw(directory, outcome)?;
+    }
+    if let (Ok(outcome), true) = (&result, asked_for(arguments, "results")) {
+        draw(&kept_folder("results"), outcome)?;
+    }
+    if let (Ok(_), "tradeoff", Effort::Full) = (&result, study.name, effort) {
+        keep_tradeoff(&chapter(study, &result, seconds, "tradeoff"))?;
+    }
+    let finding = Finding::of(study.name, &result, seconds);
+    Ok(Done {
+        text,
+        chapter: chapter(study, &result, seconds, "results"),
+        document: document(&finding, &result),
+        finding,
+    })
+}
+
+/// Runs studies side by side, one on each core, and calls `take` with the results in the order of the list. Most of the work in a study is on one
+/// core. Studies that measure time run alone, and so does every study that may end the program.
+fn each_in_order(
+    studies: &[(&'static Study, Effort)],
+    arguments: &Arguments,
+    mut take: impl FnMut(Done) -> Result<(), Failure>,
+) -> Result<(), Failure> {
+    let workers = if arguments.first { 1 } else { bfree::parallel::threads() };
+    let alone = |study: &Study| workers == 1 || MEASURE_TIME.contains(&study.name);
+    for together in studies.chunk_by(|(one, _), (other, _)| !alone(one) && !alone(other)) {
+        let next = AtomicUsize::new(0);
+        let (sender, results) = mpsc::channel();
+        std::thread::scope(|scope| {
+            for _ in 0..workers.min(together.len()) {
+                let (sender, next) = (sender.clone(), &next);
+                scope.spawn(move || {
+                    while let Some(&study) = together.get(next.fetch_add(1, Ordering::Relaxed)) {
+                        // Nobody listens after a failure.
+                        _ = sender.send((study.0.name, done(study, arguments)));
+                    }
+                });
+            }
+            drop(sender);
+            let mut waiting = HashMap::new();
+            for (study, _) in together {
+                while !waiting.contains_key(study.name) {
+                    let Ok((name, result)) = results.recv() else { return Ok(()) };
+                    waiting.insert(name, result);
+                }
+                waiting.remove(study.name).map_or(Ok(()), |result| take(result?))?;
+            }
+            Ok(())
+        })?;
+    }
+    Ok(())
 }
 
 /// The root of the repository.

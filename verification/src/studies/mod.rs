@@ -67,6 +67,9 @@ impl Study {
 /// The studies that repeat section 4 of the paper, for `cargo verify results`.
 pub const PAPER: &[&str] = &["riemann", "compaction", "rebound"];
 
+/// The studies that measure time.
+pub const MEASURE_TIME: &[&str] = &["baseline", "rebound", "tradeoff", "mutants"];
+
 /// The name of a law in a narrow column.
 fn short(name: &str) -> String {
     name.trim_start_matches("neo-Hookean, ").replace("St. Venant", "St.V.")

@@ -153,7 +153,9 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
             let finest = *effort == Effort::Full && shape == Shape::Block;
             let [plane, space] = [PLANE.len(), SPACE.len()].map(|all| if finest { all } else { all - 1 });
             refinement::<2>((name, &family), (shape, body), (&PLANE[..plane], finest), &mut refined)?;
-            refinement::<3>((name, &family), (shape, body), (&SPACE[..space], finest), &mut refined)?;
+            if *effort == Effort::Full || shape == Shape::Block {
+                refinement::<3>((name, &family), (shape, body), (&SPACE[..space], finest), &mut refined)?;
+            }
         }
     }
     let mut others = Report::new("iterations where systems are hard, block in the plane", &["quantity", "shape", "at"]);

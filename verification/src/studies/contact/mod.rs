@@ -2,6 +2,7 @@
 
 mod bar;
 mod between;
+mod disc;
 mod free;
 mod incline;
 mod indentation;
@@ -13,7 +14,7 @@ use bfree::simulation::Simulation;
 use serde_json::Value;
 
 /// The summary in the list of studies.
-pub(super) const ABOUT: &str = "contact with obstacles and between bodies: tangent, impact of bars, sliding and rolling, a wedge, patch test, Hertz, discs, free obstacles";
+pub(super) const ABOUT: &str = "contact with obstacles and between bodies: tangent, impact of bars, sliding and rolling, a wedge, patch test, Hertz, discs beside finite elements, the paper's disc, free obstacles";
 
 pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     let mut reports = tangent::reports()?;
@@ -23,6 +24,8 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     reports.push(incline::report(effort)?);
     reports.push(between::slope(effort)?);
     reports.push(between::mirrored(effort)?);
+    reports.push(disc::beside_elements(effort)?);
+    reports.push(disc::of_the_paper(effort)?);
     reports.push(wedge::report(effort)?);
     reports.extend(free::reports(effort)?);
     reports.push(indentation::patch()?);

@@ -3,7 +3,7 @@
 use super::{GAUSS, GAUSS_3, GAUSS_OF_MIDDLES, Held, Layout, NEAR, REGULAR, Refined};
 use crate::manufactured::Block;
 use crate::report::{Bound, Report};
-use crate::studies::{Outcome, StudyError};
+use crate::studies::{Effort, Outcome, StudyError};
 use crate::table::Table;
 use bfree::approximation::{Approximation, Bspline, Gimp, Linear, Lme, NotAKnotBspline};
 use bfree::grid::Grid;
@@ -117,7 +117,9 @@ impl Refining<'_> {
     }
 }
 
-fn kept(outcome: &mut Outcome) {
+/// Short effort has linear functions alone in 3D.
+fn kept(effort: Effort, outcome: &mut Outcome) {
+    let in_space = |case: &Case| effort == Effort::Full || case.name == "linear";
     let title = "a block between walls, J from 0.3 to 1.7, no inertia, the grid kept";
     let mut report = Report::new(format!("{title}: order in h"), &["of", "shape", "layout", "u at walls", "D"]);
     let header =
@@ -126,12 +128,16 @@ fn kept(outcome: &mut Outcome) {
     for case in curved() {
         let mut refining = Refining { case: &case, walls: "curved", report: &mut report, table: &mut table };
         refining.run::<2>(Block::curved_at_walls::<2>(CHANGE), &PLANE);
-        refining.run::<3>(Block::curved_at_walls::<3>(CHANGE), &SPACE);
+        if in_space(&case) {
+            refining.run::<3>(Block::curved_at_walls::<3>(CHANGE), &SPACE);
+        }
     }
     for case in straight() {
         let mut refining = Refining { case: &case, walls: "straight", report: &mut report, table: &mut table };
         refining.run::<2>(Block::straight_at_walls::<2>(CHANGE), &PLANE);
-        refining.run::<3>(Block::straight_at_walls::<3>(CHANGE), &SPACE);
+        if in_space(&case) {
+            refining.run::<3>(Block::straight_at_walls::<3>(CHANGE), &SPACE);
+        }
     }
     outcome.reports.push(report);
     outcome.tables.push(table);
@@ -200,8 +206,8 @@ fn renewed(outcome: &mut Outcome) {
     outcome.tables.push(table);
 }
 
-pub(super) fn run(outcome: &mut Outcome) {
-    kept(outcome);
+pub(super) fn run(effort: Effort, outcome: &mut Outcome) {
+    kept(effort, outcome);
     with_inertia(outcome);
     renewed(outcome);
 }

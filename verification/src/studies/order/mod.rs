@@ -242,9 +242,9 @@ impl<const N: usize> Refined<'_, N> {
 
 pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     let mut outcome = Outcome::default();
-    block::run(&mut outcome);
-    hole::run(&mut outcome);
-    ring::run(&mut outcome);
+    block::run(*effort, &mut outcome);
+    hole::run(*effort, &mut outcome);
+    ring::run(*effort, &mut outcome);
     shell::run(*effort, &mut outcome);
     beam::run(&mut outcome)?;
     vortex::run(*effort, &mut outcome)?;
