@@ -15,6 +15,9 @@ use crate::tensor::Vector;
 /// surface by less.
 const DEEPEST_START: f64 = 0.02;
 
+/// A point of a surface is a joint if this far outside it, in spacings, there is a body from a file that is joined to its own.
+const OUTSIDE: f64 = 0.25;
+
 impl<const D: usize> Builder<'_, D> {
     /// The contacts, and points on the whole surface of every body, if there are contacts. Where bodies of one nodal field are joined, there is no
     /// surface.
@@ -55,11 +58,16 @@ impl<const D: usize> Builder<'_, D> {
             contacts.points.extend(points);
         }
         let (fields, shapes) = (scene.nodal_fields(), self.shapes());
+        let clouds: Vec<_> = (0..shapes.len()).map(|body| self.cloud_of(body)).collect();
         let is_joint = |point: &SurfacePoint<D>| {
             let (own, x) = (self.particles.body[point.particle] as usize, &self.particles.position[point.particle]);
             let others = (0..shapes.len()).filter(|&other| other != own && fields[other] == fields[own]);
             let within = 2.0 * SURFACE_DEPTH * self.grid.spacing;
-            others.filter_map(|other| shapes[other].as_ref()).any(|shape| shape.signed_distance(x) <= within)
+            let outside = x + point.normal * (OUTSIDE * self.grid.spacing);
+            let mut others = others.map(|other| (&shapes[other], &clouds[other]));
+            others.any(|(shape, cloud)| {
+                shape.as_ref().map_or_else(|| cloud(&outside), |shape| shape.signed_distance(x) <= within)
+            })
         };
         mutant!("contact: joints of a group are surfaces": { return Ok(contacts); });
         contacts.points.retain(|point| !is_joint(point));
@@ -88,12 +96,20 @@ impl<const D: usize> Builder<'_, D> {
     fn around(&self, obstacle: &shape::Shape<D>) -> Option<&str> {
         let (min, max) = obstacle.bounding_box();
         let middle = Some((min + max) * 0.5).filter(|x| x.iter().all(|x| x.is_finite()))?;
-        let is_around = |body: &&Body| {
+        let is_around = |(number, body): &(usize, &Body)| {
             let shape = body.shape.as_ref().and_then(super::shape::Shape::build::<D>);
-            shape.is_some_and(|shape| shape.signed_distance(&middle) < 0.0)
+            shape.map_or_else(|| self.cloud_of(*number)(&middle), |shape| shape.signed_distance(&middle) < 0.0)
         };
-        let bodies = self.scene.bodies.iter().filter(|_| obstacle.signed_distance(&middle) <= 0.0);
-        bodies.filter(is_around).map(|body| body.name.as_str()).next()
+        let bodies = self.scene.bodies.iter().enumerate().filter(|_| obstacle.signed_distance(&middle) <= 0.0);
+        bodies.filter(is_around).map(|(_, body)| body.name.as_str()).next()
+    }
+
+    /// Whether a place lies among the particles of a body from a file; no place does in a body with a shape.
+    fn cloud_of(&self, body: usize) -> impl Fn(&Vector<f64, D>) -> bool + use<D> {
+        let (particles, is_file) = (&self.particles, self.scene.bodies[body].shape.is_none());
+        let own = |&p: &usize| is_file && particles.body[p] as usize == body && particles.is_solid(p);
+        let solid = (0..particles.len()).filter(own);
+        cloud_holds(solid.map(|p| (particles.position[p], particles.volume[p])).collect())
     }
 
     /// Refuses bodies that start in an obstacle, and a free obstacle and another one that start in each other.
@@ -163,8 +179,7 @@ impl<const D: usize> Builder<'_, D> {
         let of = |body: u32| (0..particles.len()).filter(move |&p| particles.body[p] == body);
         let Some(shape) = self.scene.bodies[outer as usize].shape.as_ref().and_then(super::shape::Shape::build::<D>)
         else {
-            let solid = of(outer).filter(|&p| particles.is_solid(p));
-            let holds = cloud_holds(solid.map(|p| (particles.position[p], particles.volume[p])).collect());
+            let holds = self.cloud_of(outer as usize);
             let p = of(inner).find(|&p| particles.is_solid(p) && holds(&particles.position[p]))?;
             return Some((p, "between its particles".to_owned()));
         };

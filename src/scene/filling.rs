@@ -9,7 +9,7 @@ use crate::mechanics::loads::CurveError;
 use crate::mechanics::reference::GridReset;
 use crate::particles::Particles;
 use crate::shape::{
-    CloudPoint, Facet, Filling, GridBox, Layout, SURFACE_DEPTH, Shape, SingleLayer, around, cloud_surface, fill,
+    CloudPoint, Facet, Filling, GridBox, Layout, NoSurface, SURFACE_DEPTH, Shape, around, cloud_surface, fill,
 };
 use crate::simulation::Simulation;
 use crate::tensor::Vector;
@@ -42,6 +42,9 @@ impl Display for BodyUse {
         }
     }
 }
+
+/// The largest edge of a particle that touches, in grid spacings. Farther outside there are hardly any nodes with mass.
+const LARGEST_EDGE: f64 = 1.5;
 
 /// The grid and the particles of a simulation that is being built.
 pub(super) struct Builder<'a, const D: usize> {
@@ -165,14 +168,24 @@ impl<const D: usize> Builder<'_, D> {
         own.extend(others);
         let cloud = own.iter().map(|&p| (particles.position[p], particles.volume[p])).collect();
         let planes: Vec<_> = self.planes_of_symmetry()?.into_iter().map(|(k, wall, _)| (k, wall)).collect();
-        let points = cloud_surface(cloud, count, &planes).map_err(|SingleLayer(p)| {
+        let points = cloud_surface(cloud, count, &planes).map_err(|NoSurface(p)| {
             let what = format!(
-                "the particle at {:?} lies in a single layer of particles or alone, where a surface that touches has no normal; give the file \
-                 at least two layers everywhere, or the body a shape",
+                "the particle at {:?} has no surface that could touch: it lies in a single layer, alone, among much smaller particles, or in an \
+                 irregular cloud; give the file particles of about one size, at least three across everywhere, or the body a shape",
                 particles.position[own[p]].as_slice()
             );
             BuildError::at(format!("bodies[{number}].particles"), what)
         })?;
+        let edge = |p: usize| particles.volume[own[p]].powf(1.0 / D as f64) / self.grid.spacing;
+        if let Some(point) = points.iter().find(|point| edge(point.particle) > LARGEST_EDGE) {
+            let what = format!(
+                "the particle at {:?} has an edge of {:.2} grid spacings, and touches half an edge outside; must be at most {LARGEST_EDGE}: take \
+                 smaller particles or a larger grid.spacing",
+                particles.position[own[point.particle]].as_slice(),
+                edge(point.particle)
+            );
+            return Err(BuildError::at(format!("bodies[{number}].particles"), what));
+        }
         Ok(points.into_iter().map(|point| CloudPoint { particle: own[point.particle], ..point }).collect())
     }
 

@@ -1,6 +1,6 @@
 //! Contact of bodies whose particles come from a file: they touch as bodies with shapes do.
 
-use crate::support::{Failure, advance, merged, run_to, solid};
+use crate::support::{Failure, advance, merged, run_to, solid, with};
 use bfree::scene;
 use bfree::simulation::Simulation;
 use serde_json::{Value, json};
@@ -176,6 +176,49 @@ fn files_without_a_surface_or_in_each_other_are_refused() -> Result<(), Failure>
     for (one, two, words) in cases {
         let error = said(one, two)?;
         assert!(words.iter().all(|word| error.contains(word)), "{words:?}: {error}");
+    }
+    // A pin between the particles, and particles that are large beside the grid.
+    let pin = json!([{ "name": "pin", "shape": { "ball": { "center": [1, 0.7], "radius": 0.02 } } }]);
+    let alone = with(scene, &[("/bodies", json!([body("one")])), ("/contact", Value::Null), ("/obstacles", pin)]);
+    let error = refused(&alone, &json!({ "one.csv": rows(0.55, 4) }))?;
+    assert!(error.contains("\"pin\" starts inside body \"one\""), "{error}");
+    let floor = json!([{ "name": "floor", "shape": { "half_space": { "point": [0, 0.3], "normal": [0, 1] } } }]);
+    let coarse = with(alone, &[("/obstacles", floor), ("/grid/spacing", json!(0.05))]);
+    let error = refused(&coarse, &json!({ "one.csv": rows(0.55, 4) }))?;
+    assert!(error.contains("has an edge of 2.00 grid spacings") && error.contains("at most 1.5"), "{error}");
+    Ok(())
+}
+
+#[test]
+fn the_joint_of_a_file_and_a_shape_is_no_surface() -> Result<(), Failure> {
+    let block = |name: &str, from: f64| {
+        let body = solid(name, 1000, json!({ "box": { "min": [from, 1], "max": [from + 0.5, 1.5] } }));
+        merged(body, json!({ "layout": "regular" }))
+    };
+    let scene = json!({
+        "grid": { "size": [2, 2], "spacing": 0.1 },
+        "time": { "step": 0.01, "end": 1 },
+        "bodies": [block("left", 0.5), block("right", 1.0)],
+        "obstacles": [{ "name": "floor", "shape": { "half_space": { "point": [0, 0.5], "normal": [0, 1] } } }]
+    });
+    let [_, files] = both::<2>(&scene)?;
+    let folder = tempfile::tempdir()?;
+    let mut text = "x,y,volume\n".to_owned();
+    for p in (0..files.particles.len()).filter(|&p| files.particles.body[p] == 0 && files.particles.is_solid(p)) {
+        let x = files.particles.position[p];
+        writeln!(text, "{},{},{}", x[0], x[1], files.particles.volume[p])?;
+    }
+    std::fs::write(folder.path().join("left.csv"), text)?;
+    let mixed =
+        with(scene, &[("/bodies/0/shape", Value::Null), ("/bodies/0/particles", json!({ "file": "left.csv" }))]);
+    let mixed: Simulation<2> = build(&mixed, folder.path())?;
+    for simulation in [files, mixed] {
+        let points = &simulation.loads.contacts.points;
+        let joint = points.iter().filter(|point| {
+            let x = simulation.particles.position[point.particle];
+            (x[0] - 1.0).abs() < 0.06 && (1.1..1.4).contains(&x[1])
+        });
+        assert_eq!(joint.count(), 0);
     }
     Ok(())
 }

@@ -115,6 +115,7 @@ pub(super) const FAULTS: &[ShippedFault] = &[
     fault("reference: contact is that of the old grid", BETWEEN, OBSTACLES),
     fault("contact: friction pushes forwards", OBSTACLES, LAWS),
     fault("clouds: the area of hidden particles is lost", SOLIDS, LAWS),
+    fault("clouds: planes of symmetry are surfaces", SOLIDS, LAWS),
     fault("free obstacles: contact does not push back", FREE, OBSTACLES),
     fault("free obstacles: forces do not turn with the obstacle", TOUCHES, OBSTACLES),
     fault("free obstacles: the moment does not turn with the obstacle", TOUCHES, OBSTACLES),
