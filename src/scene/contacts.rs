@@ -8,7 +8,7 @@ use super::load::{Loaded, Stress};
 use crate::mechanics::facing::{Overlap, overlaps};
 use crate::mechanics::loads::{BodyContact, Contacts, Obstacle, SurfacePoint};
 use crate::mechanics::sweep::stride;
-use crate::shape::{self, CloudPoint, SURFACE_DEPTH, cloud_holds};
+use crate::shape::{self, Cloud, CloudPoint, SURFACE_DEPTH};
 use crate::tensor::Vector;
 
 /// The largest depth of a body in an obstacle at the start, in grid spacings. Surface points of curved bodies lie on planes that leave the
@@ -17,6 +17,22 @@ const DEEPEST_START: f64 = 0.02;
 
 /// A point of a surface is a joint if this far outside it, in spacings, there is a body from a file that is joined to its own.
 const OUTSIDE: f64 = 0.25;
+
+/// The region of a body.
+enum Region<const D: usize> {
+    Shape(shape::Shape<D>),
+    /// That of particles from a file.
+    Cloud(Cloud<D>),
+}
+
+impl<const D: usize> Region<D> {
+    fn holds(&self, x: &Vector<f64, D>) -> bool {
+        match self {
+            Self::Shape(shape) => shape.signed_distance(x) < 0.0,
+            Self::Cloud(cloud) => cloud.holds(x),
+        }
+    }
+}
 
 impl<const D: usize> Builder<'_, D> {
     /// The contacts, and points on the whole surface of every body, if there are contacts. Where bodies of one nodal field are joined, there is no
@@ -46,8 +62,10 @@ impl<const D: usize> Builder<'_, D> {
             }
             contacts.between = Some(BodyContact::new(contact.stiffness, contact.friction, &fields));
         }
-        let exist = contacts.exist();
-        for (i, body) in scene.bodies.iter().enumerate().filter(|_| exist) {
+        if !contacts.exist() {
+            return Ok(contacts);
+        }
+        for (i, body) in scene.bodies.iter().enumerate() {
             let whole =
                 Loaded { body: &body.name, region: &None, stress: Stress::Pressure(0.0), curve: &None, surface: &None };
             let points = if body.shape.is_some() {
@@ -57,16 +75,15 @@ impl<const D: usize> Builder<'_, D> {
             };
             contacts.points.extend(points);
         }
-        let (fields, shapes) = (scene.nodal_fields(), self.shapes());
-        let clouds: Vec<_> = (0..shapes.len()).map(|body| self.cloud_of(body)).collect();
+        let (fields, regions) = (scene.nodal_fields(), self.regions());
         let is_joint = |point: &SurfacePoint<D>| {
             let (own, x) = (self.particles.body[point.particle] as usize, &self.particles.position[point.particle]);
-            let others = (0..shapes.len()).filter(|&other| other != own && fields[other] == fields[own]);
+            let mut others = (0..regions.len()).filter(|&other| other != own && fields[other] == fields[own]);
             let within = 2.0 * SURFACE_DEPTH * self.grid.spacing;
             let outside = x + point.normal * (OUTSIDE * self.grid.spacing);
-            let mut others = others.map(|other| (&shapes[other], &clouds[other]));
-            others.any(|(shape, cloud)| {
-                shape.as_ref().map_or_else(|| cloud(&outside), |shape| shape.signed_distance(x) <= within)
+            others.any(|other| match &regions[other] {
+                Region::Shape(shape) => shape.signed_distance(x) <= within,
+                Region::Cloud(cloud) => cloud.holds(&outside),
             })
         };
         mutant!("contact: joints of a group are surfaces": { return Ok(contacts); });
@@ -93,23 +110,26 @@ impl<const D: usize> Builder<'_, D> {
     }
 
     /// The body around the middle of a bounded obstacle, which may lie between particles.
-    fn around(&self, obstacle: &shape::Shape<D>) -> Option<&str> {
+    fn around(&self, regions: &[Region<D>], obstacle: &shape::Shape<D>) -> Option<&str> {
         let (min, max) = obstacle.bounding_box();
         let middle = Some((min + max) * 0.5).filter(|x| x.iter().all(|x| x.is_finite()))?;
-        let is_around = |(number, body): &(usize, &Body)| {
-            let shape = body.shape.as_ref().and_then(super::shape::Shape::build::<D>);
-            shape.map_or_else(|| self.cloud_of(*number)(&middle), |shape| shape.signed_distance(&middle) < 0.0)
-        };
-        let bodies = self.scene.bodies.iter().enumerate().filter(|_| obstacle.signed_distance(&middle) <= 0.0);
-        bodies.filter(is_around).map(|(_, body)| body.name.as_str()).next()
+        if obstacle.signed_distance(&middle) > 0.0 {
+            return None;
+        }
+        let mut bodies = self.scene.bodies.iter().zip(regions);
+        bodies.find(|(_, region)| region.holds(&middle)).map(|(body, _)| body.name.as_str())
     }
 
-    /// Whether a place lies among the particles of a body from a file; no place does in a body with a shape.
-    fn cloud_of(&self, body: usize) -> impl Fn(&Vector<f64, D>) -> bool + use<D> {
-        let (particles, is_file) = (&self.particles, self.scene.bodies[body].shape.is_none());
-        let own = |&p: &usize| is_file && particles.body[p] as usize == body && particles.is_solid(p);
-        let solid = (0..particles.len()).filter(own);
-        cloud_holds(solid.map(|p| (particles.position[p], particles.volume[p])).collect())
+    /// The region of each body.
+    fn regions(&self) -> Vec<Region<D>> {
+        let particles = &self.particles;
+        let region = |(number, body): (usize, &Body)| {
+            let own = |&p: &usize| particles.body[p] as usize == number && particles.is_solid(p);
+            let solid = (0..particles.len()).filter(own).map(|p| (particles.position[p], particles.volume[p]));
+            let shape = body.shape.as_ref().and_then(super::shape::Shape::build::<D>);
+            shape.map_or_else(|| Region::Cloud(Cloud::new(solid.collect())), Region::Shape)
+        };
+        self.scene.bodies.iter().enumerate().map(region).collect()
     }
 
     /// Refuses bodies that start in an obstacle, and a free obstacle and another one that start in each other.
@@ -126,7 +146,10 @@ impl<const D: usize> Builder<'_, D> {
             );
             return Err(BuildError::at(format!("obstacles[{one}]"), what));
         }
-        let (particles, h) = (&self.particles, self.grid.spacing);
+        if obstacles.is_empty() {
+            return Ok(());
+        }
+        let (particles, regions, h) = (&self.particles, self.regions(), self.grid.spacing);
         for (i, obstacle) in obstacles.iter().enumerate() {
             let depth = |p: usize| -obstacle.shape.signed_distance(&particles.position[p]);
             let deepest = (0..particles.len()).max_by(|&a, &b| depth(a).total_cmp(&depth(b)));
@@ -140,7 +163,7 @@ impl<const D: usize> Builder<'_, D> {
                 );
                 return Err(BuildError::at(format!("obstacles[{i}]"), what));
             }
-            if let Some(body) = self.around(&obstacle.shape) {
+            if let Some(body) = self.around(&regions, &obstacle.shape) {
                 let what = format!("obstacle {:?} starts inside body {body:?}; move one of the two", obstacle.name);
                 return Err(BuildError::at(format!("obstacles[{i}]"), what));
             }
@@ -148,17 +171,14 @@ impl<const D: usize> Builder<'_, D> {
         Ok(())
     }
 
-    /// The shape of each body; `None` for a body from a file.
-    fn shapes(&self) -> Vec<Option<shape::Shape<D>>> {
-        self.scene.bodies.iter().map(|body| body.shape.as_ref()?.build::<D>()).collect()
-    }
-
     /// Refuses bodies that start in each other, where they may touch.
     pub fn refuse_overlapping_bodies(&self, contacts: &Contacts<D>) -> Result<(), BuildError> {
-        for pair in contacts.between.iter().flat_map(|between| &between.pairs) {
+        let Some(between) = &contacts.between else { return Ok(()) };
+        let regions = self.regions();
+        for pair in &between.pairs {
             let [one, other] = pair.bodies;
             for (inner, outer) in [(one, other), (other, one)] {
-                if let Some((p, how)) = self.inside(inner, outer) {
+                if let Some((p, how)) = self.inside(inner, &regions[outer as usize]) {
                     let [inner, outer] = [inner, outer].map(|body| &self.scene.bodies[body as usize].name);
                     let what = format!(
                         "body {inner:?} starts in body {outer:?}: its point at {:?} is {how}; move one of the two, or put both in one group of \
@@ -169,24 +189,25 @@ impl<const D: usize> Builder<'_, D> {
                 }
             }
         }
-        let Some(between) = &contacts.between else { return Ok(()) };
         self.refuse_touching_clouds(contacts, between)
     }
 
-    /// A particle of the body `inner` that lies in the body `outer`, and how deep.
-    fn inside(&self, inner: u32, outer: u32) -> Option<(usize, String)> {
+    /// A particle of the body `inner` that lies in the region of another body, and its depth in words.
+    fn inside(&self, inner: u32, outer: &Region<D>) -> Option<(usize, String)> {
         let (particles, h) = (&self.particles, self.grid.spacing);
-        let of = |body: u32| (0..particles.len()).filter(move |&p| particles.body[p] == body);
-        let Some(shape) = self.scene.bodies[outer as usize].shape.as_ref().and_then(super::shape::Shape::build::<D>)
-        else {
-            let holds = self.cloud_of(outer as usize);
-            let p = of(inner).find(|&p| particles.is_solid(p) && holds(&particles.position[p]))?;
-            return Some((p, "between its particles".to_owned()));
-        };
-        let depth = |p: usize| -shape.signed_distance(&particles.position[p]);
-        let deepest = of(inner).max_by(|&a, &b| depth(a).total_cmp(&depth(b)))?;
-        let allowed = format!("{:.3} grid spacings deep, and {DEEPEST_START} is allowed", depth(deepest) / h);
-        (depth(deepest) > DEEPEST_START * h).then_some((deepest, allowed))
+        let mut own = (0..particles.len()).filter(|&p| particles.body[p] == inner);
+        match outer {
+            Region::Cloud(cloud) => {
+                let p = own.find(|&p| particles.is_solid(p) && cloud.holds(&particles.position[p]))?;
+                Some((p, "between its particles".to_owned()))
+            }
+            Region::Shape(shape) => {
+                let depth = |p: usize| -shape.signed_distance(&particles.position[p]);
+                let deepest = own.max_by(|&a, &b| depth(a).total_cmp(&depth(b)))?;
+                let words = format!("{:.3} grid spacings deep, and {DEEPEST_START} is allowed", depth(deepest) / h);
+                (depth(deepest) > DEEPEST_START * h).then_some((deepest, words))
+            }
+        }
     }
 
     /// Refuses a body from a file whose surface starts in another surface.

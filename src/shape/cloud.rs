@@ -49,10 +49,22 @@ pub(crate) type CloudParticle<const D: usize> = (Vector<f64, D>, f64);
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct NoSurface(pub usize);
 
-/// Whether a place lies in the cloud: c > ½ there.
-pub(crate) fn cloud_holds<const D: usize>(cloud: Vec<CloudParticle<D>>) -> impl Fn(&Vector<f64, D>) -> bool + use<D> {
-    let near = Near::new(&cloud, RADIUS * edge(&cloud));
-    move |x| near.sum(&cloud, x).0 > 0.5
+/// The region of a cloud, where c > ½.
+pub(crate) struct Cloud<const D: usize> {
+    particles: Vec<CloudParticle<D>>,
+    near: Near<D>,
+}
+
+impl<const D: usize> Cloud<D> {
+    pub fn new(particles: Vec<CloudParticle<D>>) -> Self {
+        let near = Near::new(&particles, RADIUS * edge(&particles));
+        Self { particles, near }
+    }
+
+    /// Whether `x` lies in the cloud.
+    pub fn holds(&self, x: &Vector<f64, D>) -> bool {
+        self.near.sum(&self.particles, x).0 > 0.5
+    }
 }
 
 /// The surface of the first `own` particles of a cloud. All others belong to bodies that are joined to it, and `planes` of symmetry, each by
@@ -123,7 +135,7 @@ fn edge<const D: usize>(cloud: &[CloudParticle<D>]) -> f64 {
     middle.map_or(1.0, |volume| volume.powf(1.0 / D as f64))
 }
 
-/// Adds each hidden vector to the nearest particles of the surface within R. What is farther inside is noise of an irregular cloud.
+/// Adds each hidden vector to the nearest particles of the surface within R. Vectors farther inside are noise of an irregular cloud.
 fn add_hidden<const D: usize>(
     cloud: &[CloudParticle<D>],
     hidden: &[(usize, Vector<f64, D>)],
@@ -283,8 +295,8 @@ mod tests {
 
     #[test]
     fn a_cloud_holds_what_lies_below_its_surface() {
-        let holds = cloud_holds(lattice::<2>(0.3, |x| x.norm() < 1.0));
-        let at = |r: f64| holds(&Vector::from([0.6 * r, -0.8 * r]));
+        let cloud = Cloud::new(lattice::<2>(0.3, |x| x.norm() < 1.0));
+        let at = |r: f64| cloud.holds(&Vector::from([0.6 * r, -0.8 * r]));
         assert!(at(0.0) && at(0.85) && !at(1.1) && !at(5.0));
     }
 

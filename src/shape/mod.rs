@@ -25,7 +25,7 @@ mod tests;
 
 pub use ball::Ball;
 pub use block::Block;
-pub(crate) use cloud::{CloudPoint, NoSurface, cloud_holds, cloud_surface};
+pub(crate) use cloud::{Cloud, CloudPoint, NoSurface, cloud_surface};
 pub use combined::{Difference, Intersection, Union};
 pub use cone::Cone;
 pub use cut::Facet;

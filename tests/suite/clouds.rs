@@ -3,24 +3,29 @@
 use crate::support::{Failure, advance, merged, run_to, solid, with};
 use bfree::scene;
 use bfree::simulation::Simulation;
+use bfree::tensor::Vector;
 use serde_json::{Value, json};
 use std::fmt::Write;
 use std::path::Path;
 
-/// The simulation of a scene and, beside it, files with the particles of all its bodies; and that of the scene with these files as bodies.
+/// The particles of a body, as a file.
+fn file<const D: usize>(Simulation { particles, .. }: &Simulation<D>, body: u32) -> Result<String, Failure> {
+    let mut text = format!("{},volume\n", ["x", "y", "z"][..D].join(","));
+    for p in (0..particles.len()).filter(|&p| particles.body[p] == body && particles.is_solid(p)) {
+        particles.position[p].iter().try_for_each(|x| write!(text, "{x},"))?;
+        writeln!(text, "{}", particles.volume[p])?;
+    }
+    Ok(text)
+}
+
+/// Two simulations of a scene: as it is, and with all its bodies from files of their particles.
 fn both<const D: usize>(scene: &Value) -> Result<[Simulation<D>; 2], Failure> {
     let folder = tempfile::tempdir()?;
     let drawn: Simulation<D> = build(scene, folder.path())?;
     let mut read = scene.clone();
     for (number, body) in read["bodies"].as_array_mut().into_iter().flatten().enumerate() {
-        let mut text = format!("{},volume\n", ["x", "y", "z"][..D].join(","));
-        let particles = &drawn.particles;
-        for p in (0..particles.len()).filter(|&p| particles.body[p] as usize == number && particles.is_solid(p)) {
-            particles.position[p].iter().try_for_each(|x| write!(text, "{x},"))?;
-            writeln!(text, "{}", particles.volume[p])?;
-        }
         let name = format!("{number}.csv");
-        std::fs::write(folder.path().join(&name), text)?;
+        std::fs::write(folder.path().join(&name), file(&drawn, number as u32)?)?;
         body["shape"] = Value::Null;
         body["particles"] = json!({ "file": name });
     }
@@ -32,10 +37,10 @@ fn build<const D: usize>(scene: &Value, folder: &Path) -> Result<Simulation<D>, 
     Ok(scene::read(&scene.to_string(), &[])?.build(folder)?)
 }
 
-/// The message that refuses the scene with files.
-fn refused(scene: &Value, shapes: &Value) -> Result<String, Failure> {
+/// The message that refuses the scene with these files, by their names.
+fn refused(scene: &Value, files: &Value) -> Result<String, Failure> {
     let folder = tempfile::tempdir()?;
-    for (name, text) in shapes.as_object().into_iter().flatten() {
+    for (name, text) in files.as_object().into_iter().flatten() {
         std::fs::write(folder.path().join(name), text.as_str().unwrap_or_default())?;
     }
     Ok(build::<2>(scene, folder.path()).map(drop).unwrap_err().to_string())
@@ -67,10 +72,8 @@ fn a_disc_from_a_file_bounces_and_spins_as_its_shape_does() -> Result<(), Failur
         let particles = &simulation.particles;
         let mass: f64 = particles.mass.iter().sum();
         let velocity = particles.momentum() / mass;
-        let middle = (0..particles.len())
-            .map(|p| particles.position[p] * particles.mass[p])
-            .sum::<bfree::tensor::Vector<f64, 2>>()
-            / mass;
+        let middle =
+            (0..particles.len()).map(|p| particles.position[p] * particles.mass[p]).sum::<Vector<f64, 2>>() / mass;
         let spin = (0..particles.len())
             .map(|p| particles.mass[p] * (particles.position[p] - middle).perp(&particles.velocity[p]))
             .sum::<f64>()
@@ -80,8 +83,8 @@ fn a_disc_from_a_file_bounces_and_spins_as_its_shape_does() -> Result<(), Failur
     let [(first, velocity, spin), (first_file, velocity_file, spin_file)] = ends[..] else {
         return Err("two runs".into());
     };
-    assert!((first - first_file).abs() < 0.011, "{first} {first_file}");
-    assert!((velocity - velocity_file).norm() < 0.02 * velocity.norm(), "{velocity} {velocity_file}");
+    assert!((first - first_file).abs() < 0.006, "{first} {first_file}");
+    assert!((velocity - velocity_file).norm() < 0.005 * velocity.norm(), "{velocity} {velocity_file}");
     assert!((spin - spin_file).abs() < 0.05 * spin.abs(), "{spin} {spin_file}");
     Ok(())
 }
@@ -107,12 +110,13 @@ fn blocks_from_files_are_pressed_as_their_shapes_are() -> Result<(), Failure> {
         let particles = &simulation.particles;
         let solid = || (0..particles.len()).filter(|&p| particles.is_solid(p));
         let strain: Vec<f64> = solid().map(|p| particles.displacement_gradient[p][(1, 1)]).collect();
-        means.push(strain.iter().sum::<f64>() / strain.len() as f64);
-        spreads.push(strain.iter().map(|one| (one - means[0]).abs()).fold(0.0, f64::max));
+        let mean = strain.iter().sum::<f64>() / strain.len() as f64;
+        means.push(mean);
+        spreads.push(strain.iter().map(|one| (one - mean).abs()).fold(0.0, f64::max));
     }
     // Areas of 0.8 to 1.1 of the exact ones change the penalty, and hardly the stress.
     assert!((means[0] / means[1] - 1.0).abs() < 0.02, "{means:?}");
-    assert!((spreads[0] / spreads[1] - 1.0).abs() < 0.2, "{spreads:?}");
+    assert!((spreads[0] / spreads[1] - 1.0).abs() < 0.05, "{spreads:?}");
     Ok(())
 }
 
@@ -139,7 +143,7 @@ fn discs_from_files_meet_and_part_with_momentum() -> Result<(), Failure> {
         rebounds.push(momentum(0) / mass);
     }
     // A staircase of particles meets another one with more ringing than two circles do.
-    assert!((rebounds[0] / rebounds[1] - 1.0).abs() < 0.08 && rebounds[1] < -0.9, "{rebounds:?}");
+    assert!((rebounds[0] / rebounds[1] - 1.0).abs() < 0.06 && rebounds[1] < -0.9, "{rebounds:?}");
     Ok(())
 }
 
@@ -203,12 +207,7 @@ fn the_joint_of_a_file_and_a_shape_is_no_surface() -> Result<(), Failure> {
     });
     let [_, files] = both::<2>(&scene)?;
     let folder = tempfile::tempdir()?;
-    let mut text = "x,y,volume\n".to_owned();
-    for p in (0..files.particles.len()).filter(|&p| files.particles.body[p] == 0 && files.particles.is_solid(p)) {
-        let x = files.particles.position[p];
-        writeln!(text, "{},{},{}", x[0], x[1], files.particles.volume[p])?;
-    }
-    std::fs::write(folder.path().join("left.csv"), text)?;
+    std::fs::write(folder.path().join("left.csv"), file(&files, 0)?)?;
     let mixed =
         with(scene, &[("/bodies/0/shape", Value::Null), ("/bodies/0/particles", json!({ "file": "left.csv" }))]);
     let mixed: Simulation<2> = build(&mixed, folder.path())?;

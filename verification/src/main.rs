@@ -153,9 +153,9 @@ fn run(studies: &[(&'static Study, Effort)], arguments: &Arguments) -> Result<bo
     Ok(passed)
 }
 
-/// What is kept of a study.
+/// The results of a study.
 struct Done {
-    /// What the program prints.
+    /// The printed text.
     text: Vec<u8>,
     chapter: String,
     document: Value,
@@ -214,6 +214,7 @@ fn each_in_order(
             let mut waiting = HashMap::new();
             for (study, _) in together {
                 while !waiting.contains_key(study.name) {
+                    // Without a sender a worker has panicked. The scope then panics too.
                     let Ok((name, result)) = results.recv() else { return Ok(()) };
                     waiting.insert(name, result);
                 }

@@ -12,7 +12,7 @@ const PART: usize = 2048;
 pub(super) struct Interpolation {
     /// The coarse nodes around each finer node.
     around: Lists,
-    /// The finer nodes around which each coarse node is one, in their order.
+    /// The finer nodes that are interpolated from each coarse node, in ascending order.
     within: Lists,
 }
 

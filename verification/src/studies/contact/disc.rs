@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 /// Duration of contact, largest force and rebound by finite elements (`verification/reference/disc_on_wall.py 48`).
 const ELEMENTS: [f64; 3] = [0.2080, 48.7, 0.9854];
 
-/// What happens at the wall.
+/// The measured values of an impact.
 struct Impact {
     /// The end of the first step with a force.
     first: f64,
