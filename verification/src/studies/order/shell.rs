@@ -81,13 +81,16 @@ pub(super) fn run(effort: Effort, outcome: &mut Outcome) {
     let mut report = Report::new(format!("{title}: order in h"), &["of", "shape"]);
     let header = ["shape", "cells in 1", "displacement", "order", "stress", "order", "products x particles"];
     let mut table = Table::new(format!("{title}: errors, relative to Lamé's solution"), header);
-    let few: &[u32] = if effort == Effort::Full { &[2, 4, 8] } else { &[2, 4] };
-    for (name, family, sizes, of_stress) in [
+    let full = effort == Effort::Full;
+    let few: &[u32] = if full { &[2, 4, 8] } else { &[2, 4] };
+    let families = [
         ("linear", "\"linear\"", few, 1.0),
         ("quadratic", r#"{"bspline":{"degree":2}}"#, few, 1.5),
         // From here on the error of the centroids of boxes shows: order 1.3.
         ("cubic", r#"{"bspline":{"degree":3}}"#, &[4, 8], 1.5),
-    ] {
+    ];
+    // The cubic shell of 8 cells takes as long as a fifth of the whole study at short effort.
+    for (name, family, sizes, of_stress) in families.into_iter().filter(|&(name, ..)| full || name != "cubic") {
         let [displacement, stress] = [2.0, of_stress].map(|order| Bound::AtLeast(order - NEAR));
         let least = [("displacement, sphere", displacement), ("stress, sphere", stress)];
         Refined { report: &mut report, table: &mut table, least }.run(&[name], sizes, |cells| shell(family, cells));
