@@ -13,6 +13,9 @@ const ISOCHORIC: f64 = 0.999;
 /// Above this ratio, the dilatations of averaged cells are unknowns of their own. The ratio is that of ν = 0.444.
 const NEARLY_INCOMPRESSIBLE: f64 = 0.8;
 
+/// Courant number of pressure waves above which the mixed form is faster than the displacement form with block-Jacobi.
+const MIXED_STEPS: f64 = 30.0;
+
 /// Numbers of particles in 1D, 2D and 3D from which on multigrid was faster than block-Jacobi in long steps with inertia.
 const MANY: [usize; 3] = [500, 20_000, 50_000];
 
@@ -37,11 +40,13 @@ impl<const D: usize, L: Law, A> Simulation<D, L, A> {
             (Multigrid, "for the motions; a Schur complement for the pressures of averaged cells")
         } else if !self.settings.scheme.has_inertia() {
             (Multigrid, "there is no inertia")
-        } else if !self.takes_long_steps() {
+        } else if !self.takes_steps_above(LONG_STEPS) {
             (BlockJacobi, "inertia dominates")
         } else if self.has_internal_variable(PLASTIC_STRAIN) {
             // Near a limit load, multigrid takes a fourth to a sixtieth of the iterations (`docs/src/tutorial/plasticity.md`).
             (Multigrid, "the body may flow")
+        } else if !self.takes_steps_above(MIXED_STEPS) && self.bodies.iter().any(averages_pressure) {
+            (BlockJacobi, "steps are too short for the mixed form to pay")
         } else if self.bodies.iter().any(|body| stiffness_ratio(body) > ISOCHORIC) {
             (Multigrid, "a body hardly changes its volume")
         } else if self.particles.len() >= MANY[D - 1] {
@@ -55,19 +60,28 @@ impl<const D: usize, L: Law, A> Simulation<D, L, A> {
     /// asks for a solver of the displacement form.
     pub(crate) fn is_mixed(&self) -> bool {
         let settings = &self.settings;
-        let solver = matches!(settings.preconditioner, Preconditioning::Automatic | Preconditioning::Multigrid)
-            && settings.newton.krylov != Krylov::ConjugateGradient
-            && !settings.scheme.follows_path();
-        let stiff = |body: &Body<L>| body.averages() && stiffness_ratio(body) > NEARLY_INCOMPRESSIBLE;
-        solver && self.takes_long_steps() && self.bodies.iter().any(stiff)
+        let shortest = match settings.preconditioner {
+            Preconditioning::Automatic => MIXED_STEPS,
+            Preconditioning::Multigrid => LONG_STEPS,
+            _ => return false,
+        };
+        settings.newton.krylov != Krylov::ConjugateGradient
+            && !settings.scheme.follows_path()
+            && self.takes_steps_above(shortest)
+            && self.bodies.iter().any(averages_pressure)
     }
 
-    /// Whether inertia does not dominate the steps: load steps, and steps at large Courant numbers.
-    fn takes_long_steps(&self) -> bool {
+    /// Whether steps are load steps, or have Courant numbers above this one.
+    fn takes_steps_above(&self, limit: f64) -> bool {
         let across = self.clock.nominal() / self.grid.spacing;
         let courant = |body: &Body<L>| (p_wave_modulus(&body.law) / body.density).sqrt() * across;
-        !self.settings.scheme.has_inertia() || self.bodies.iter().any(|body| courant(body) > LONG_STEPS)
+        !self.settings.scheme.has_inertia() || self.bodies.iter().any(|body| courant(body) > limit)
     }
+}
+
+/// Whether a body is nearly incompressible and averages its dilatation by cell.
+fn averages_pressure<L: Law>(body: &Body<L>) -> bool {
+    body.averages() && stiffness_ratio(body) > NEARLY_INCOMPRESSIBLE
 }
 
 /// The volumetric stiffness over Λ + 2G.

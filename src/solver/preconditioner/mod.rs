@@ -58,7 +58,7 @@ pub trait Preconditioner {
 #[serde(rename_all = "snake_case")]
 pub enum Preconditioning {
     /// Multigrid without inertia, and in steps at Courant numbers above 10 for bodies that are large, may flow plastically or hardly change their
-    /// volume. Otherwise block-Jacobi.
+    /// volume, above 30 where they average that change by cell. Otherwise block-Jacobi.
     #[default]
     Automatic,
     /// Block-Jacobi: the inverses of the diagonal blocks. It is cheap, and enough where inertia dominates.
