@@ -209,15 +209,20 @@ impl Cells {
         own.map(|(&unknown, scale)| unknown * T::lit(scale.dilatation)).collect()
     }
 
-    /// The unknowns of the cells from the present θ of their particles.
-    pub fn unknowns<const D: usize>(&self, particles: &Particles<D>) -> Vec<f64> {
+    /// Θ − 1 of every cell from the present θ of its particles.
+    pub fn changes_now<const D: usize>(&self, particles: &Particles<D>) -> Vec<f64> {
         let reference = particles.reference();
-        let of = |((members, _), scale): ((&[Member], f64), &Scale)| {
+        let of = |(members, _): (&[Member], f64)| {
             let p = members[0].particle as usize;
             let before = reference.dilatation(p);
-            (particles.dilatation(p) - before) / (1.0 + before) / scale.dilatation
+            (particles.dilatation(p) - before) / (1.0 + before)
         };
-        self.iter().zip(&self.scales).map(of).collect()
+        self.iter().map(of).collect()
+    }
+
+    /// The unknowns of the cells from the present θ of their particles.
+    pub fn unknowns<const D: usize>(&self, particles: &Particles<D>) -> Vec<f64> {
+        self.changes_now(particles).iter().zip(&self.scales).map(|(change, scale)| change / scale.dilatation).collect()
     }
 }
 

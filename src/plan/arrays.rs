@@ -8,7 +8,7 @@ use crate::mechanics::loads::SurfacePoint;
 use crate::mechanics::reference::GridReset;
 use crate::mechanics::sweep::Supports;
 use crate::mechanics::tangent::tangent_bytes;
-use crate::mechanics::terms::linearized_rows;
+use crate::mechanics::terms::dilatation_rows;
 use crate::mechanics::transfer::Projection;
 use crate::particles::{Body, Particles};
 use crate::simulation::Simulation;
@@ -132,7 +132,8 @@ impl<const D: usize, L: Law, A: ShapeFunction> Inventory<'_, D, L, A> {
         let averages = simulation.bodies.iter().any(Body::averages);
         // θ, and on a kept grid θ at the last reset; the cell, and the result of a loop over particles there.
         let dilatation_bytes = Cells::BYTES + NUMBER * if self.keeps_grid { 4 } else { 3 };
-        let linearized_dilatation = supports.groups() * LANES * (linearized_rows(D) + 1) * NUMBER;
+        let linearized_dilatation =
+            supports.groups() * LANES * (dilatation_rows(D, simulation.has_mean_stress()) + 1) * NUMBER;
         let preconditioner = simulation.preconditioner().0;
         let multigrid = preconditioner == Preconditioning::Multigrid;
         let followers = supports.extension().map_or(0, |extension| extension.bytes());

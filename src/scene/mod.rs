@@ -49,7 +49,6 @@ use crate::material::{self, Law, Material};
 use crate::mechanics::loads::Rayleigh;
 use crate::mechanics::reference::GridReset;
 use crate::mechanics::schemes::Parameters;
-use crate::particles::Dilatation;
 use crate::shape::Layout;
 use crate::simulation::InitialGuess;
 use schemars::JsonSchema;
@@ -296,9 +295,6 @@ impl Scene {
     /// Refuses bodies whose stress has no mean over a step.
     fn refuse_without_mean_stress(&self, problems: &mut Problems) {
         for (i, body) in self.bodies.iter().enumerate() {
-            let allowed = "must be \"pointwise\" with time.scheme \"energy_momentum\", which has no mean dilatation";
-            let pointwise = body.volumetric == Dilatation::Pointwise;
-            problems.require(pointwise, &format!("bodies[{i}].volumetric"), "\"mean_dilatation\"", allowed);
             let library = match body.material {
                 material::Parameters::Umat(_) => "\"umat\"",
                 material::Parameters::Mfront(_) => "\"mfront\"",

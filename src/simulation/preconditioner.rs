@@ -67,6 +67,7 @@ impl<const D: usize, L: Law, A> Simulation<D, L, A> {
         };
         settings.newton.krylov != Krylov::ConjugateGradient
             && !settings.scheme.follows_path()
+            && !self.has_mean_stress()
             && self.takes_steps_above(shortest)
             && self.bodies.iter().any(averages_pressure)
     }

@@ -23,20 +23,24 @@
 //!
 //! F_½ on the left and F_{n+1} on the right differ, so the tangent is not symmetric.
 
-use crate::material::{InternalVariable, Law, MaterialState, TangentBlocks};
+use crate::material::{InternalVariable, Law, MaterialState, TangentBlocks, VolumeResponse};
 use crate::scalar::Real;
 use crate::tensor::{Deformation, Tensor, Vector, contract, identity, outer, scaled, symmetric};
 
 /// Gauss points s in [0, 1] and their weights. The integral of a polynomial of degree 5 is exact.
-const GAUSS: [(f64, f64); 3] =
+pub(in crate::mechanics) const GAUSS: [(f64, f64); 3] =
     [(0.112_701_665_379_258_31, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
 
 /// The error of W and of S_G : ΔE by round-off, relative to their magnitudes.
-const ROUND_OFF: f64 = 16.0 * f64::EPSILON;
+pub(in crate::mechanics) const ROUND_OFF: f64 = 16.0 * f64::EPSILON;
 
 /// A law whose stress at H_½ is the mean stress S̄ of the step from H_n. W and the internal variables are those of the law.
+///
+/// Where cells average the dilatation, W lacks its volumetric part U(J), which [`DilatationOfStep`](crate::mechanics::terms) gives cell by cell.
 pub(super) struct DiscreteGradient<'a, L> {
     pub law: &'a L,
+    /// Whether W lacks U(J).
+    pub averages: bool,
     /// The rows of H_n; the first D·D numbers are used.
     pub start: &'a [f64; 9],
 }
@@ -62,9 +66,36 @@ impl<L: Law> DiscreteGradient<'_, L> {
         middle.deformed(stretch(&(strain + scaled(&self.growth(middle), T::lit(s))))).in_step(dt, middle.internal)
     }
 
+    /// U at J, if W lacks it.
+    fn volumetric<T: Real, const D: usize>(&self, at: &MaterialState<'_, T, D>) -> Option<VolumeResponse<T>> {
+        let along = || Deformation::new(Tensor::<T, 1>::from_element(at.j));
+        if self.averages { self.law.volumetric(&along()) } else { None }
+    }
+
+    /// W, and the magnitude of its parts.
+    fn density<T: Real, const D: usize>(&self, at: &MaterialState<'_, T, D>) -> (T, f64) {
+        let (whole, volumetric) = (self.law.energy(at), self.volumetric(at).map_or(T::zero(), |of| of.energy));
+        (whole - volumetric, whole.value().abs() + volumetric.value().abs())
+    }
+
+    /// ∂W/∂E, with ∂U/∂E = J U' C⁻¹.
+    fn gradient<T: Real, const D: usize>(&self, at: &MaterialState<'_, T, D>) -> Tensor<T, D> {
+        let stress = self.law.stress(at);
+        self.volumetric(at).map_or(stress, |of| stress - scaled(&inverse_strain(at), of.stress))
+    }
+
+    /// ∂²W/∂E² : X for a symmetric X.
+    fn stiffness<const D: usize>(&self, at: &MaterialState<'_, f64, D>, x: &Tensor<f64, D>) -> Tensor<f64, D> {
+        let stiffness = self.law.elasticity(at, x);
+        self.volumetric(at).map_or(stiffness, |of| {
+            let inverse = inverse_strain(at);
+            stiffness - inverse * (of.stiffness * contract(&inverse, x)) + inverse * x * inverse * (2.0 * of.stress)
+        })
+    }
+
     /// S_G
     fn integral<T: Real, const D: usize>(&self, middle: &MaterialState<'_, T, D>) -> Tensor<T, D> {
-        let stress = |(s, weight)| scaled(&self.law.stress(&self.state(middle, s)), T::lit(weight));
+        let stress = |(s, weight)| scaled(&self.gradient(&self.state(middle, s)), T::lit(weight));
         GAUSS.into_iter().map(stress).fold(Tensor::zeros(), |sum, stress| sum + stress)
     }
 
@@ -79,9 +110,9 @@ impl<L: Law> DiscreteGradient<'_, L> {
         }
         let growth = self.growth(middle);
         let work = contract(integral, &growth);
-        let [before, after] = [0.0, 1.0].map(|s| self.law.energy(&self.state(middle, s)));
-        let missing = after - before - work;
-        let mut size = before.value().abs() + after.value().abs() + work.value().abs();
+        let [before, after] = [0.0, 1.0].map(|s| self.density(&self.state(middle, s)));
+        let missing = after.0 - before.0 - work;
+        let mut size = before.1 + after.1 + work.value().abs();
         // A plastic law has its elastic strain from C and the plastic strain, which cancel.
         if !self.law.internal_variables().is_empty() {
             let stretched = contract(&middle.f, &middle.f).value();
@@ -90,6 +121,12 @@ impl<L: Law> DiscreteGradient<'_, L> {
         mutant!("discrete gradient: Gauss's formula is not corrected": { return None; });
         (missing.value().abs() > ROUND_OFF * size).then(|| missing / contract(&growth, &growth))
     }
+}
+
+/// C⁻¹
+fn inverse_strain<T: Real, const D: usize>(at: &MaterialState<'_, T, D>) -> Tensor<T, D> {
+    let inverse = at.inverse_transpose();
+    inverse.transpose() * inverse
 }
 
 /// The upper triangular H with (I + H)ᵀ(I + H) = I + 2E, by Cholesky's method. A small E loses no digits.
@@ -133,13 +170,13 @@ impl<L: Law> Law for DiscreteGradient<'_, L> {
             mutant!("discrete gradient: all points move like the middle": share = 0.5 * weight);
             for q in 0..D {
                 for p in 0..=q {
-                    stiffness[p][q] += self.law.elasticity(&at, &outer(&unit(p), &unit(q))) * share;
+                    stiffness[p][q] += self.stiffness(&at, &symmetric(&outer(&unit(p), &unit(q)))) * share;
                 }
             }
         }
         let (growth, integral) = (self.growth(middle), self.integral(middle));
         let corrected = self.correction(middle, &integral);
-        let slope = corrected.map(|c| self.law.stress(&self.state(middle, 1.0)) - integral - growth * (2.0 * c));
+        let slope = corrected.map(|c| self.gradient(&self.state(middle, 1.0)) - integral - growth * (2.0 * c));
         let end = identity::<f64, D>() + middle.h * 2.0 - self.start::<f64, D>();
         mutant!("discrete gradient: the tangent has F of the middle on both sides": end = middle.f);
         let mut blocks: TangentBlocks<D> = [[Tensor::zeros(); D]; D];
@@ -192,7 +229,7 @@ mod tests {
     /// S̄ of a step between two deformations, and ΔE.
     fn mean(law: &Material, from: &Tensor<f64, 3>, to: &Tensor<f64, 3>) -> (Tensor<f64, 3>, Tensor<f64, 3>) {
         let rows: [f64; 9] = std::array::from_fn(|n| from[(n / 3, n % 3)]);
-        let mean = DiscreteGradient { law, start: &rows };
+        let mean = DiscreteGradient { law, averages: false, start: &rows };
         let middle = MaterialState::new((from + to) * 0.5);
         (mean.stress(&middle), mean.growth(&middle))
     }

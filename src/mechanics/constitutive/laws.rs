@@ -81,10 +81,10 @@ impl<'a, T: Real> States<'a, T> {
         self
     }
 
-    /// The law whose stress is the mean stress of the step, of one particle.
-    fn mean<'s, L>(&'s self, law: &'s L, lane: usize) -> DiscreteGradient<'s, L> {
+    /// The law whose stress is the mean stress of the step, of one particle. If the body `averages` its dilatation, the law lacks U(J).
+    fn mean<'s, L>(&'s self, law: &'s L, averages: bool, lane: usize) -> DiscreteGradient<'s, L> {
         const AT_REST: [f64; 9] = [0.0; 9];
-        DiscreteGradient { law, start: self.start.as_ref().map_or(&AT_REST, |start| &start[lane]) }
+        DiscreteGradient { law, averages, start: self.start.as_ref().map_or(&AT_REST, |start| &start[lane]) }
     }
 
     /// ∇u, F of the last grid reset with the internal variables at t_n, and V₀ of one particle.
@@ -110,10 +110,10 @@ impl<const D: usize, L: Law> Laws<'_, D, L> {
             let shipped: Box<dyn Any> = Box::new(shipped(material(law)?, D, Quantity::Stress));
             shipped.downcast::<Box<Evaluation<'static, T>>>().ok()
         };
-        let of_body = self.evaluations(|law| match in_lanes(law) {
+        let of_body = self.evaluations(|law, averages| match in_lanes(law) {
             _ if self.discrete_gradient => Box::new(move |states, out, det_f| {
                 stresses_of::<T, D>(
-                    |lane, at, g, v| point::internal(&states.mean(law, lane), at, g, v, part),
+                    |lane, at, g, v| point::internal(&states.mean(law, averages, lane), at, g, v, part),
                     states,
                     out,
                     det_f,
@@ -148,10 +148,10 @@ impl<const D: usize, L: Law> Laws<'_, D, L> {
         form: Form,
     ) -> impl Fn(Group<'_>, &At<f64, D, D>, &mut [[f64; LANES]]) -> Result<(), Inadmissible> + Sync {
         let discrete_gradient = self.discrete_gradient;
-        let of_body = self.evaluations(move |law| match material(law) {
+        let of_body = self.evaluations(move |law, averages| match material(law) {
             _ if discrete_gradient => Box::new(move |states, out, det_f| {
                 tangents_of::<D>(
-                    |lane, at, g, v| point::linearize(&states.mean(law, lane), at, g, v, part),
+                    |lane, at, g, v| point::linearize(&states.mean(law, averages, lane), at, g, v, part),
                     states,
                     form,
                     out,
@@ -168,9 +168,12 @@ impl<const D: usize, L: Law> Laws<'_, D, L> {
         move |group, at, rows| self.evaluate(&of_body, group, at, rows)
     }
 
-    /// The evaluations that `choose` picks for the law of each body.
-    fn evaluations<'s, T>(&'s self, choose: impl Fn(&'s L) -> Box<Evaluation<'s, T>>) -> Vec<Box<Evaluation<'s, T>>> {
-        self.bodies.iter().map(|body| choose(&body.law)).collect()
+    /// The evaluations that `choose` picks for each body, from its law and whether it averages its dilatation.
+    fn evaluations<'s, T>(
+        &'s self,
+        choose: impl Fn(&'s L, bool) -> Box<Evaluation<'s, T>>,
+    ) -> Vec<Box<Evaluation<'s, T>>> {
+        self.bodies.iter().map(|body| choose(&body.law, body.averages())).collect()
     }
 
     /// Evaluates every law that occurs in the group for all lanes, and keeps the lanes of its own particles.

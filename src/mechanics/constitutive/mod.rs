@@ -11,6 +11,7 @@ mod laws;
 mod point;
 mod tangents;
 
+pub(super) use discrete_gradient::{GAUSS, ROUND_OFF};
 pub use laws::Laws;
 pub use point::{Inadmissible, Part, compose};
-pub(crate) use tangents::{AddTo, Form, Product, add_quadratic, product};
+pub(crate) use tangents::{AddTo, Form, Product, add_quadratic, general, product};

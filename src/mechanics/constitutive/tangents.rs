@@ -49,7 +49,7 @@ impl Form {
 
 /// The row of entry (i, j) of the block 𝔸_kl in a general tangent.
 #[inline(always)]
-pub(super) const fn general<const D: usize>(k: usize, l: usize, i: usize, j: usize) -> usize {
+pub(crate) const fn general<const D: usize>(k: usize, l: usize, i: usize, j: usize) -> usize {
     ((k * D + l) * D + i) * D + j
 }
 

@@ -42,13 +42,41 @@ pub(crate) struct MeanDilatation<'a, const D: usize, L> {
 }
 
 /// The state of a cell at one Δφ.
-struct State<T> {
+pub(super) struct State<T> {
     /// Θ − 1
-    change: T,
+    pub change: T,
+    /// Σ V₀ U(θ)
+    pub energy: T,
     /// π
-    pressure: T,
+    pub pressure: T,
     /// k
-    stiffness: T,
+    pub stiffness: T,
+}
+
+impl<T: Real> State<T> {
+    /// The state of the cell with the particles `members` and the volume V_c at Θ = 1 + `change`.
+    pub fn of<const D: usize, L: Law>(step: &Step<'_, D, L>, members: &[Member], volume: f64, change: T) -> Self {
+        let (particles, per_volume) = (step.particles, ((change + T::one()) * T::lit(volume)).recip());
+        let [mut energy, mut stress, mut stiffness] = [T::zero(); 3];
+        for p in members.iter().map(|member| member.particle as usize) {
+            let (of, volume) = (at_mean(step, p, change), T::lit(particles.volume[p]));
+            energy += of.energy * volume;
+            stress += of.stress * volume;
+            stiffness += (of.stiffness - of.stress) * volume;
+        }
+        Self { change, energy, pressure: stress * per_volume, stiffness: stiffness * per_volume * per_volume }
+    }
+}
+
+/// U of a particle's body at 1 + `change`; zero for a body without U, whose particles are in no cell.
+fn response<T: Real, const D: usize, L: Law>(step: &Step<'_, D, L>, p: usize, change: T) -> VolumeResponse<T> {
+    let nothing = VolumeResponse { energy: T::zero(), stress: T::zero(), stiffness: T::zero() };
+    step.bodies[step.particles.body[p] as usize].response(change).unwrap_or(nothing)
+}
+
+/// U at θ = Θ θ_n of a particle, with Θ − 1 = `change` of its cell.
+fn at_mean<T: Real, const D: usize, L: Law>(step: &Step<'_, D, L>, p: usize, change: T) -> VolumeResponse<T> {
+    response(step, p, total(change, step.particles.reference().dilatation(p)))
 }
 
 /// The state of a particle at one Δφ.
@@ -61,19 +89,9 @@ struct Local<T: Real, const D: usize> {
 
 impl<'a, const D: usize, L: Law> MeanDilatation<'a, D, L> {
     pub(super) fn of(step: &Step<'a, D, L>) -> Option<Self> {
-        let cells = Cells::of(step.particles, step.bodies, step.supports)?;
-        Some(Self { step: *step, cells })
-    }
-
-    /// U of a particle's body at 1 + `change`; zero for a body without U, whose particles are in no cell.
-    fn response<T: Real>(&self, p: usize, change: T) -> VolumeResponse<T> {
-        let nothing = VolumeResponse { energy: T::zero(), stress: T::zero(), stiffness: T::zero() };
-        self.step.bodies[self.step.particles.body[p] as usize].response(change).unwrap_or(nothing)
-    }
-
-    /// U at θ = Θ θ_n of a particle, with Θ − 1 = `change` of its cell.
-    fn at_mean<T: Real>(&self, p: usize, change: T) -> VolumeResponse<T> {
-        self.response(p, total(change, self.step.particles.reference().dilatation(p)))
+        // The mean stress of a step has a term of its own.
+        let cells = (!step.alphas.discrete_gradient).then(|| Cells::of(step.particles, step.bodies, step.supports));
+        Some(Self { step: *step, cells: cells?? })
     }
 
     /// U at J, which the law contains already.
@@ -82,22 +100,12 @@ impl<'a, const D: usize, L: Law> MeanDilatation<'a, D, L> {
         let (at, _) = MaterialState::new(compose(g, h_r)).admissible_or_rest();
         let f_r_t = (identity::<f64, D>() + h_r).transpose().map(T::lit);
         let a = scaled(&(cofactor(&at.f) * f_r_t), T::lit(self.step.particles.volume[p]));
-        Local { jacobian: at.jacobian, response: self.response(p, at.j), a }
+        Local { jacobian: at.jacobian, response: response(&self.step, p, at.j), a }
     }
 
     fn states<T: Number>(&self, at: Trial<'_, T, D>) -> Vec<State<T>> {
-        let Step { particles, supports, .. } = self.step;
-        let changes = self.cells.changes_at(particles, supports, at);
-        let state = |((members, volume), change): ((&[_], f64), T)| {
-            let (mut stress, mut stiffness) = (T::zero(), T::zero());
-            for p in members.iter().map(|member: &Member| member.particle as usize) {
-                let (of, volume) = (self.at_mean(p, change), T::lit(particles.volume[p]));
-                stress += of.stress * volume;
-                stiffness += (of.stiffness - of.stress) * volume;
-            }
-            let per_volume = ((change + T::one()) * T::lit(volume)).recip();
-            State { change, pressure: stress * per_volume, stiffness: stiffness * per_volume * per_volume }
-        };
+        let changes = self.cells.changes_at(self.step.particles, self.step.supports, at);
+        let state = |((members, volume), change)| State::of(&self.step, members, volume, change);
         self.cells.iter().zip(changes).map(state).collect()
     }
 }
@@ -161,7 +169,7 @@ impl<const D: usize, L: Law> Term<D> for MeanDilatation<'_, D, L> {
             |p, _, g| {
                 let Some(cell) = self.cells.cell(p as u32) else { return [T::zero(); 2] };
                 let volume = T::lit(particles.volume[p]);
-                let (mean, own) = (self.at_mean(p, states[cell].change), self.local(p, &g).response);
+                let (mean, own) = (at_mean(&self.step, p, states[cell].change), self.local(p, &g).response);
                 [mean.energy * volume, -own.energy * volume]
             },
             |p, both| energies[p] = both,

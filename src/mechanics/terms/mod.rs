@@ -12,6 +12,7 @@
 mod contact;
 mod damping;
 mod dead_load;
+mod dilatation_of_step;
 mod inertia;
 mod mean_dilatation;
 mod planned;
@@ -20,13 +21,13 @@ mod stress;
 mod term;
 
 pub(crate) use contact::{ContactForce, penalties};
-pub(crate) use mean_dilatation::linearized_rows;
 pub(crate) use planned::planned;
 pub(crate) use term::{Along, Linearized, MixedCell, MixedCells};
 pub use term::{AtPoints, Piece, Role, Step, Sum};
 
 use damping::Damping;
 use dead_load::DeadLoad;
+use dilatation_of_step::DilatationOfStep;
 use inertia::Inertia;
 use mean_dilatation::MeanDilatation;
 use pressure::Pressure;
@@ -45,6 +46,7 @@ pub(crate) enum AnyTerm<'a, const D: usize, L> {
     Inertia(Inertia<'a, D>),
     Stress(Stress<'a, D, L>),
     MeanDilatation(MeanDilatation<'a, D, L>),
+    DilatationOfStep(DilatationOfStep<'a, D, L>),
     Damping(Damping<'a, D, L>),
     DeadLoad(DeadLoad<D>),
     Pressure(Pressure<'a, D>),
@@ -58,12 +60,22 @@ macro_rules! of_term {
             AnyTerm::Inertia($term) => $value,
             AnyTerm::Stress($term) => $value,
             AnyTerm::MeanDilatation($term) => $value,
+            AnyTerm::DilatationOfStep($term) => $value,
             AnyTerm::Damping($term) => $value,
             AnyTerm::DeadLoad($term) => $value,
             AnyTerm::Pressure($term) => $value,
             AnyTerm::ContactForce($term) => $value,
         }
     };
+}
+
+/// Numbers per particle in the linearised tangent of mean dilatation, also of the mean stress of a step.
+pub(crate) const fn dilatation_rows(dimension: usize, discrete_gradient: bool) -> usize {
+    if discrete_gradient {
+        dilatation_of_step::linearized_rows(dimension)
+    } else {
+        mean_dilatation::linearized_rows(dimension)
+    }
 }
 
 /// The terms of one step.
@@ -76,6 +88,7 @@ impl<'a, const D: usize, L: Law> Terms<'a, D, L> {
             Inertia::of(step).map(AnyTerm::Inertia),
             Some(AnyTerm::Stress(Stress::of(step))),
             MeanDilatation::of(step).map(AnyTerm::MeanDilatation),
+            DilatationOfStep::of(step).map(AnyTerm::DilatationOfStep),
             Damping::of(step).map(AnyTerm::Damping),
             DeadLoad::body_force(step).map(AnyTerm::DeadLoad),
             DeadLoad::traction(step).map(AnyTerm::DeadLoad),

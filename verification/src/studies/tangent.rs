@@ -164,7 +164,7 @@ const MEAN: &str = "mean dilatation";
 const WITH_MEAN: &str = ", mean dilatation";
 
 /// Gives the body the mean dilatation of cells, as after a grid reset; returns `false` if its law has no volumetric part.
-fn average<const D: usize, L: Law>(simulation: &mut Simulation<D, L>, random: &mut Random) -> bool {
+pub(super) fn average<const D: usize, L: Law>(simulation: &mut Simulation<D, L>, random: &mut Random) -> bool {
     let [body] = simulation.bodies.as_mut_slice() else { return false };
     body.dilatation = Dilatation::MeanDilatation;
     simulation.particles.dilatation = (0..simulation.particles.len()).map(|_| 0.1 * random.signed()).collect();
