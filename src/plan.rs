@@ -224,7 +224,7 @@ fn terms<const D: usize, L: Law, A>(
         (
             "dilatation of cells",
             cells > 0,
-            format!("{cells} cells have an unknown of their own: nearly incompressible, in long steps"),
+            format!("{cells} cells have an unknown of their own: nearly incompressible, in long steps, not with energy_momentum"),
         ),
         ("aggregation", settings.aggregation, aggregated),
         ("smoothing", smooths, "only with a transfer other than flip".into()),

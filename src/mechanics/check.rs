@@ -30,7 +30,7 @@ pub fn tangent_bound<const D: usize>(f: &Tensor<f64, D>) -> f64 {
 }
 
 /// The largest relative difference that is ever accepted. The mean stress of a step divides the round-off of energies by the square of the strain
-/// in the step, and has this bound in all states.
+/// in the step, and always has this bound; metals that yield strongly may exceed it (`docs/src/limits.md`).
 const LARGEST: f64 = 1e-10;
 
 /// A difference between the product with the tangent and the derivative of the residual.

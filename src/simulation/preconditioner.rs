@@ -46,7 +46,7 @@ impl<const D: usize, L: Law, A> Simulation<D, L, A> {
             // Near a limit load, multigrid takes a fourth to a sixtieth of the iterations (`docs/src/tutorial/plasticity.md`).
             (Multigrid, "the body may flow")
         } else if !self.takes_steps_above(MIXED_STEPS) && self.bodies.iter().any(averages_pressure) {
-            (BlockJacobi, "steps are too short for the mixed form to pay")
+            (BlockJacobi, "steps are short for a body that averages its dilatation")
         } else if self.bodies.iter().any(|body| stiffness_ratio(body) > ISOCHORIC) {
             (Multigrid, "a body hardly changes its volume")
         } else if self.particles.len() >= MANY[D - 1] {

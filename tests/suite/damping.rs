@@ -1,6 +1,6 @@
 //! Rayleigh damping: the energy it dissipates, its rate, and the quantities it must leave unchanged.
 
-use crate::support::{Failure, advance, body, scene};
+use crate::support::{Failure, advance, body, built, scene};
 use bfree::approximation::{Approximation, Bspline};
 use bfree::clock::Clock;
 use bfree::grid::Grid;
@@ -12,7 +12,9 @@ use bfree::particles::Particles;
 use bfree::simulation::{Settings, Simulation};
 use bfree::solver::{Forcing, NewtonSettings};
 use bfree::tensor::{Tensor, Vector};
+use serde_json::json;
 use std::f64::consts::PI;
+use std::num::NonZeroU64;
 
 /// Tight tolerances, so that only round-off remains.
 fn tight() -> NewtonSettings {
@@ -43,6 +45,34 @@ fn a_free_rigid_body_slows_down_as_the_trapezoidal_rule_says() -> Result<(), Fai
             assert!((found - lost).abs() < 10.0 * bound * lost, "{lumping}, step {n}: {found} for {lost}");
         }
         assert!(simulation.strain_energy() < 1e-20 && simulation.external_work == 0.0);
+    }
+    Ok(())
+}
+
+/// A nearly incompressible disc falls on a floor. J of its particles is free within a cell, so that the stiffness of U(J) is not positive.
+#[test]
+fn damping_of_averaged_cells_takes_energy_in_every_step() -> Result<(), Failure> {
+    for (scheme, end) in [("newmark", 0.2), ("energy_momentum", 0.1)] {
+        let disc = json!({ "name": "disc", "shape": { "ball": { "center": [0.7, 0.7], "radius": 0.5 } }, "velocity": [0, -3], "density": 1000,
+                           "material": { "neo_hookean": { "young": 1e5, "poisson": 0.4999 } }, "volumetric": "mean_dilatation" });
+        let mut simulation: Simulation<2> = built(&json!({
+            "grid": { "origin": [-1, -0.2], "size": [3, 2.2], "spacing": 0.2 },
+            "time": { "step": 0.005, "end": 1, "scheme": scheme },
+            "bodies": [disc], "damping": { "stiffness": 5e-4 },
+            "obstacles": [{ "name": "floor", "shape": { "half_space": { "point": [0, 0], "normal": [0, 1] } } }]
+        }))?;
+        simulation.settings.check_tangent = NonZeroU64::new(10);
+        while simulation.clock.time() < end {
+            let before = simulation.dissipated;
+            simulation.advance()?;
+            assert!(
+                simulation.dissipated >= before,
+                "{scheme}, {}: {}",
+                simulation.clock.time(),
+                simulation.dissipated
+            );
+        }
+        assert!(simulation.dissipated > 5.0, "{scheme}: {}", simulation.dissipated);
     }
     Ok(())
 }

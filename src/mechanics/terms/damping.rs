@@ -1,7 +1,9 @@
 //! Rayleigh damping, (a M̃ + b K_n) v. K_n is the material part of the stiffness at the beginning of the step, so b K_n does not damp rigid
-//! rotations.
+//! rotations. Of a body whose cells average the dilatation, K_n is the material part of W − U(J), and the stiffness of each cell against a change
+//! of its volume. The material part of U(J) is not positive there: nothing holds the J of single particles, and J U' may be much larger than G.
 
 use super::inertia::LinearizedMass;
+use super::mean_dilatation::{LinearizedMean, MeanDilatation};
 use super::stress::{LinearizedStress, Stress};
 use super::term::{Along, Linearized, LinearizedTerm, Role, Step, Sum, Term, summed};
 use crate::material::Law;
@@ -11,6 +13,7 @@ use crate::mechanics::schemes::Alphas;
 use crate::mechanics::sweep::Number;
 use crate::mechanics::transfer::Nodal;
 use crate::mechanics::trial::Trial;
+use crate::particles::Body;
 use crate::tensor::Vector;
 
 /// (a M̃ + b K_n) v; absent without inertia.
@@ -19,19 +22,31 @@ pub(crate) struct Damping<'a, const D: usize, L> {
     step: Step<'a, D, L>,
     /// K_n; `None` if b = 0 or if a particle has det F ≤ 0. In the second case the stress has no value either, and the step fails there.
     stiffness: Option<LinearizedStress>,
+    /// The part of K_n that belongs to averaged cells.
+    of_cells: Option<LinearizedMean<'a, D, L>>,
 }
 
 impl<'a, const D: usize, L: Law> Damping<'a, D, L> {
     pub(super) fn of(step: &Step<'a, D, L>) -> Option<Self> {
         let rayleigh = step.loads.damping.filter(|_| !step.nodal.is_static())?;
         let stiff = (rayleigh.stiffness > 0.0).then(|| Self::stiffness(step));
-        Some(Self { rayleigh, step: *step, stiffness: stiff.and_then(Result::ok) })
+        let of_cells = if rayleigh.stiffness > 0.0 { Self::stiffness_of_cells(step) } else { None };
+        Some(Self { rayleigh, step: *step, stiffness: stiff.and_then(Result::ok), of_cells })
     }
 
-    /// The material part of the stiffness at φ_n, the nodal motion since the last grid reset.
+    /// The material part of the stiffness at φ_n, the nodal motion since the last grid reset, without U(J) of averaged bodies: the mean stress of
+    /// a step without motion lacks U(J), and has the stiffness of the law.
     fn stiffness(step: &Step<'a, D, L>) -> Result<LinearizedStress, Inadmissible> {
         let motion: Vec<_> = step.nodal.moved(step.supports.nodes()).collect();
-        Stress::of(step).linearized(&motion, Part::Material)
+        let alphas = Alphas { discrete_gradient: step.bodies.iter().any(Body::averages), ..step.alphas };
+        Stress::of(&Step { alphas, ..*step }).linearized(&motion, Part::Material)
+    }
+
+    /// The stiffness of averaged cells against a change of volume at φ_n.
+    fn stiffness_of_cells(step: &Step<'a, D, L>) -> Option<LinearizedMean<'a, D, L>> {
+        let motion: Vec<_> = step.nodal.moved(step.supports.nodes()).collect();
+        let alphas = Alphas { discrete_gradient: false, ..step.alphas };
+        Some(MeanDilatation::of(&Step { alphas, ..*step })?.volumetric_stiffness(&motion))
     }
 }
 
@@ -40,7 +55,9 @@ impl<const D: usize, L: Law> Damping<'_, D, L> {
     fn force(&self, v: &[Vector<f64, D>]) -> Vec<Vector<f64, D>> {
         let mut force = vec![Vector::zeros(); v.len()];
         self.step.mass().add_product(self.rayleigh.mass, v, &mut force);
-        if let Some((mode, add)) = self.stiffness.as_ref().and_then(|of| of.product_at_points(Along::Field(v, None))) {
+        let of_law = self.stiffness.as_ref().and_then(|of| of.product_at_points(Along::Field(v, None)));
+        let of_cells = self.of_cells.as_ref().and_then(|of| of.product_at_points(Along::Field(v, None)));
+        for (mode, add) in of_law.into_iter().chain(of_cells) {
             let mut of_stiffness = vec![Vector::<f64, D>::zeros(); v.len()];
             self.step.supports.accumulate(Some(v), mode, &mut of_stiffness, add);
             force.iter_mut().zip(&of_stiffness).for_each(|(force, more)| *force += more * self.rayleigh.stiffness);
@@ -106,6 +123,9 @@ impl<const D: usize, L: Law> Term<D> for Damping<'_, D, L> {
         let mut addends: Vec<Box<dyn Linearized<D> + '_>> = vec![Box::new(of_mass)];
         if stiffness > 0.0 {
             addends.push(Box::new(Self::stiffness(&self.step)?.times(a4 * stiffness)));
+            if let Some(of_cells) = Self::stiffness_of_cells(&self.step) {
+                addends.push(Box::new(of_cells.times(a4 * stiffness)));
+            }
         }
         Ok(addends)
     }

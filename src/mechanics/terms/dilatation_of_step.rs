@@ -1,15 +1,16 @@
 //! The mean dilatation of cells in the energy–momentum scheme. The mean stress of the law lacks U(J)
-//! ([`constitutive`](crate::mechanics::constitutive)), and this term adds a discrete gradient of the energy E = Σ V₀ U(θ) of each cell:
+//! ([`constitutive`](crate::mechanics::constitutive)), and this term adds a discrete gradient of the energy Π = Σ V₀ U(θ) of each cell:
 //!
 //! ```text
-//! π̄ = (E_{n+1} − E_n)/(v_{n+1} − v_n)                 v = Σ V₀ J, the volume of the cell
-//! σ = π̄ a,  a = V₀ F_½ G F_rᵀ,  G : ΔE = J_{n+1} − J_n
+//! π̄ = (Π_{n+1} − Π_n)/(v_{n+1} − v_n)                 v = Σ V₀ J, the volume of the cell
+//! σ = π̄ a,  a = V₀ F_½ G F_rᵀ
 //! G = 2/(J_n + J_{n+1}) · (cof C_n + 4 cof C_m + cof C_{n+1})/6,  C_m = ½ (C_n + C_{n+1})
 //! ```
 //!
-//! The work of σ in the step is then E_{n+1} − E_n, and G is symmetric, so no angular momentum is lost. Simpson's rule is exact here, because cof C
-//! is quadratic along the step (Betsch, Janz and Hesch, Comput. Methods Appl. Mech. Eng. 335, 2018). In small steps, where the quotient π̄ has no
-//! digits, it is the mean of π at the Gauss points.
+//! G is the discrete gradient of J: with the Green–Lagrange strain E, G : ΔE = J_{n+1} − J_n. Simpson's rule is exact here, because cof C is at most
+//! quadratic along the step (Betsch, Janz and Hesch, Comput. Methods Appl. Mech. Eng. 335, 2018). The work of σ in the step is therefore Π_{n+1} −
+//! Π_n, and no angular momentum is lost, because G is symmetric. The code has π̄ as the mean of π at three Gauss points, and corrects it to the
+//! quotient where the two differ by more than round-off.
 //!
 //! With b = ∂v_{n+1}/∂(∇u) = 2 V₀ cof(F_{n+1}) F_rᵀ and k̄ = ∂π̄/∂v_{n+1}:
 //!
@@ -145,7 +146,7 @@ impl<'a, const D: usize, L: Law> DilatationOfStep<'a, D, L> {
 
     /// The mean of a cell that grows from (1 + `before`) V_c by `growth`.
     fn mean<T: Number>(&self, members: &[Member], volume: f64, before: f64, growth: T) -> Mean<T> {
-        let change = scaled_or_rest(growth, volume, before);
+        let change = relative(growth, volume, before);
         let at = |s: f64| State::of(&self.step, members, volume, T::lit(before) + change * T::lit(s));
         let mut mean = Mean { pressure: T::zero(), stiffness: T::zero() };
         for (s, weight) in GAUSS {
@@ -156,7 +157,7 @@ impl<'a, const D: usize, L: Law> DilatationOfStep<'a, D, L> {
         let [start, end] = [at(0.0), at(1.0)];
         let work = mean.pressure * growth;
         let missing = end.energy - start.energy - work;
-        let size = [start.energy, end.energy, work].map(|energy| energy.value().abs()).iter().sum::<f64>();
+        let size = start.size + end.size + work.value().abs();
         mutant!("mean dilatation of a step: Gauss's formula is not corrected": { return mean; });
         if missing.value().abs() > ROUND_OFF * size {
             mean.pressure += missing / growth;
@@ -166,8 +167,8 @@ impl<'a, const D: usize, L: Law> DilatationOfStep<'a, D, L> {
     }
 }
 
-/// The change of Θ by `growth`; none in a cell that is turned inside out.
-fn scaled_or_rest<T: Number>(growth: T, volume: f64, before: f64) -> T {
+/// The change of Θ by `growth`. In a cell that is turned inside out it is zero; one of its particles then has det F ≤ 0, and the step fails there.
+fn relative<T: Number>(growth: T, volume: f64, before: f64) -> T {
     let change = growth * T::lit(1.0 / volume);
     if change.value() + before > -1.0 { change } else { T::zero() }
 }

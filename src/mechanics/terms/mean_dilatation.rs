@@ -31,6 +31,7 @@ use crate::mechanics::trial::Trial;
 use crate::pooled::Pooled;
 use crate::scalar::Real;
 use crate::tensor::{Tensor, Vector, cofactor, identity, scaled};
+use std::sync::Arc;
 
 /// The smallest bulk modulus in the choice of γ, relative to G.
 const SOFTEST: f64 = 1e-3;
@@ -38,7 +39,7 @@ const SOFTEST: f64 = 1e-3;
 /// Σ_p V₀ [U(θ_p) − U(J_p)]; absent if no body has mean dilatation.
 pub(crate) struct MeanDilatation<'a, const D: usize, L> {
     step: Step<'a, D, L>,
-    cells: Cells,
+    cells: Arc<Cells>,
 }
 
 /// The state of a cell at one Δφ.
@@ -47,6 +48,8 @@ pub(super) struct State<T> {
     pub change: T,
     /// Σ V₀ U(θ)
     pub energy: T,
+    /// The magnitude to which the round-off of `energy` is relative: θ = Θ θ_r cancels where a compressed cell is compressed no more.
+    pub size: f64,
     /// π
     pub pressure: T,
     /// k
@@ -57,14 +60,16 @@ impl<T: Real> State<T> {
     /// The state of the cell with the particles `members` and the volume V_c at Θ = 1 + `change`.
     pub fn of<const D: usize, L: Law>(step: &Step<'_, D, L>, members: &[Member], volume: f64, change: T) -> Self {
         let (particles, per_volume) = (step.particles, ((change + T::one()) * T::lit(volume)).recip());
-        let [mut energy, mut stress, mut stiffness] = [T::zero(); 3];
+        let ([mut energy, mut stress, mut stiffness], mut size) = ([T::zero(); 3], 0.0);
         for p in members.iter().map(|member| member.particle as usize) {
             let (of, volume) = (at_mean(step, p, change), T::lit(particles.volume[p]));
             energy += of.energy * volume;
             stress += of.stress * volume;
             stiffness += (of.stiffness - of.stress) * volume;
+            let parts = change.value().abs() + particles.reference().dilatation(p).abs();
+            size += (of.energy.value().abs() + of.stress.value().abs() * parts) * volume.value();
         }
-        Self { change, energy, pressure: stress * per_volume, stiffness: stiffness * per_volume * per_volume }
+        Self { change, energy, size, pressure: stress * per_volume, stiffness: stiffness * per_volume * per_volume }
     }
 }
 
@@ -91,7 +96,7 @@ impl<'a, const D: usize, L: Law> MeanDilatation<'a, D, L> {
     pub(super) fn of(step: &Step<'a, D, L>) -> Option<Self> {
         // The mean stress of a step has a term of its own.
         let cells = (!step.alphas.discrete_gradient).then(|| Cells::of(step.particles, step.bodies, step.supports));
-        Some(Self { step: *step, cells: cells?? })
+        Some(Self { step: *step, cells: Arc::new(cells??) })
     }
 
     /// U at J, which the law contains already.
@@ -110,7 +115,49 @@ impl<'a, const D: usize, L: Law> MeanDilatation<'a, D, L> {
     }
 }
 
-impl<const D: usize, L: Law> MeanDilatation<'_, D, L> {
+impl<'a, const D: usize, L: Law> MeanDilatation<'a, D, L> {
+    /// A, zeros, κ, q, and V₀ J of all particles, where `local` gives κ = V₀ (J π − J T') and q = V₀ (J π − T) from the cell, V₀ J, V₀ and U at J.
+    fn rows(
+        &self,
+        dphi: &[Vector<f64, D>],
+        local: impl Fn(usize, f64, f64, VolumeResponse<f64>) -> [f64; 2] + Sync,
+    ) -> Pooled<[f64; LANES]> {
+        let supports = self.step.supports;
+        let (closed, count) = (Form::Closed.rows(D), linearized_rows(D));
+        let mut rows = supports.pool().unspecified(supports.groups() * count, [0.0; LANES]);
+        supports.fill_rows(dphi, count, &mut rows, |group, at, rows| {
+            rows.fill([0.0; LANES]);
+            for (lane, &p) in group.particles.iter().enumerate() {
+                let Some(cell) = self.cells.cell(p) else { continue };
+                let Local { jacobian, response, a } = self.local(p as usize, &at.lane(lane).1);
+                let volume = self.step.particles.volume[p as usize];
+                let weight = volume * jacobian;
+                for i in 0..D {
+                    for k in 0..D {
+                        rows[i * D + k][lane] = a[(i, k)] / weight;
+                    }
+                }
+                let [bulk, q] = local(cell, weight, volume, response);
+                rows[closed - 2][lane] = bulk;
+                rows[closed - 1][lane] = q;
+                rows[closed][lane] = weight;
+            }
+        });
+        rows
+    }
+
+    /// The stiffness of all cells against a change of their volume, for damping: k̂ (Σ a_q : L_q) a with k̂ = Σ V₀ θ T' / v². It is symmetric and
+    /// positive semidefinite.
+    pub(super) fn volumetric_stiffness(&self, dphi: &[Vector<f64, D>]) -> LinearizedMean<'a, D, L> {
+        let states = self.states(Trial::motion(dphi));
+        let volumes = self.cells.iter().map(|(_, volume)| volume);
+        let stiffness =
+            |(state, volume): (&State<f64>, f64)| state.stiffness + state.pressure / ((1.0 + state.change) * volume);
+        let stiffness = states.iter().zip(volumes).map(stiffness).collect();
+        let rows = self.rows(dphi, |_, _, _, _| [0.0; 2]);
+        LinearizedMean { step: self.step, cells: self.cells.clone(), rows, stiffness, mixed: None }
+    }
+
     /// G/h (v − Θ V_c) of every cell in the mixed form, with Θ from its own unknown; empty in the displacement form.
     pub(super) fn residuals<T: Number>(&self, at: Trial<'_, T, D>) -> Vec<T> {
         if at.dilatation.is_empty() {
@@ -178,31 +225,14 @@ impl<const D: usize, L: Law> Term<D> for MeanDilatation<'_, D, L> {
     }
 
     fn linearize(&self, at: Trial<'_, f64, D>, _: Part) -> LinearizedTerm<'_, D> {
-        let supports = self.step.supports;
         let states = self.states(at);
-        let (closed, count) = (Form::Closed.rows(D), Form::Closed.rows(D) + 1);
-        let mut rows = supports.pool().unspecified(supports.groups() * count, [0.0; LANES]);
-        supports.fill_rows(at.dphi, count, &mut rows, |group, at, rows| {
-            rows.fill([0.0; LANES]);
-            for (lane, &p) in group.particles.iter().enumerate() {
-                let Some(cell) = self.cells.cell(p) else { continue };
-                let Local { jacobian, response, a } = self.local(p as usize, &at.lane(lane).1);
-                let volume = self.step.particles.volume[p as usize];
-                let weight = volume * jacobian;
-                for i in 0..D {
-                    for k in 0..D {
-                        rows[i * D + k][lane] = a[(i, k)] / weight;
-                    }
-                }
-                // κ = V₀ (J π − J T'), q = V₀ (J π − T), and V₀ J
-                let of_mean = weight * states[cell].pressure;
-                rows[closed - 2][lane] = of_mean - volume * response.stiffness;
-                rows[closed - 1][lane] = of_mean - volume * response.stress;
-                rows[closed][lane] = weight;
-            }
+        let rows = self.rows(at.dphi, |cell, weight, volume, response| {
+            let of_mean = weight * states[cell].pressure;
+            [of_mean - volume * response.stiffness, of_mean - volume * response.stress]
         });
         let stiffness: Vec<f64> = states.iter().map(|state| state.stiffness).collect();
-        let mut linearized = LinearizedMean { of: self, rows, stiffness, mixed: None };
+        let mut linearized =
+            LinearizedMean { step: self.step, cells: self.cells.clone(), rows, stiffness, mixed: None };
         if !at.dilatation.is_empty() {
             let cells = linearized.mixed_cells(&states);
             linearized.stiffness = cells.iter().map(|cell| cell.augmented).collect();
@@ -218,8 +248,9 @@ pub(crate) const fn linearized_rows(dimension: usize) -> usize {
 }
 
 /// The linearised δσ: `stiffness` couples the particles of a cell, and `rows` is the local part.
-struct LinearizedMean<'a, const D: usize, L> {
-    of: &'a MeanDilatation<'a, D, L>,
+pub(super) struct LinearizedMean<'a, const D: usize, L> {
+    step: Step<'a, D, L>,
+    cells: Arc<Cells>,
     /// A, zeros, κ, q, and V₀ J.
     rows: Pooled<[f64; LANES]>,
     /// k; in the mixed form γ.
@@ -229,6 +260,12 @@ struct LinearizedMean<'a, const D: usize, L> {
 }
 
 impl<const D: usize, L: Law> LinearizedMean<'_, D, L> {
+    /// This [`MeanDilatation::volumetric_stiffness`] times a factor.
+    pub(super) fn times(mut self, factor: f64) -> Self {
+        self.stiffness.iter_mut().for_each(|stiffness| *stiffness *= factor);
+        self
+    }
+
     /// A, zeros, κ and q of a group, and V₀ J.
     fn of_group(&self, group: usize) -> (&[[f64; LANES]], &[f64; LANES]) {
         let count = linearized_rows(D);
@@ -245,7 +282,7 @@ impl<const D: usize, L: Law> LinearizedMean<'_, D, L> {
 
     /// The cells of the mixed form, with γ = k₀/v and k₀ = κ G/(κ + G).
     fn mixed_cells(&self, states: &[State<f64>]) -> Vec<MixedCell<D>> {
-        let Step { particles, supports, .. } = self.of.step;
+        let Step { particles, supports, .. } = self.step;
         let (grid, reference) = (supports.grid(), particles.reference());
         let cell = |(members, reference_volume): (&[Member], f64), state: &State<f64>, scale: &Scale, id: u64| {
             let volume = (1.0 + state.change) * reference_volume;
@@ -268,7 +305,7 @@ impl<const D: usize, L: Law> LinearizedMean<'_, D, L> {
                 reference_volume,
             }
         };
-        let cells = &self.of.cells;
+        let cells = &self.cells;
         let all = cells.iter().zip(states).zip(cells.scales.iter().zip(&cells.ids));
         all.map(|((members, state), (scale, &id))| cell(members, state, scale, id)).collect()
     }
@@ -276,11 +313,11 @@ impl<const D: usize, L: Law> LinearizedMean<'_, D, L> {
     /// δp of every cell: as given, or k δv with δv = Σ V₀ J A : ∇u (γ δv in the mixed form).
     fn coupling(&self, along: Along<'_, D>) -> Vec<f64> {
         let volumes = match along {
-            Along::Field(_, Some(pressures)) => return pressures.to_vec(),
-            Along::Field(u, None) => self.volume_changes(u),
+            Along::Field(_, Some(pressures)) if self.mixed.is_some() => return pressures.to_vec(),
+            Along::Field(u, _) => self.volume_changes(u),
             Along::Gradient(gradient) => {
                 let sum = |members: &[Member]| members.iter().map(|member| self.pull(member).dot(gradient)).sum();
-                self.of.cells.iter().map(|(members, _)| sum(members)).collect()
+                self.cells.iter().map(|(members, _)| sum(members)).collect()
             }
         };
         volumes.iter().zip(&self.stiffness).map(|(v, k): (&f64, _)| k * v).collect()
@@ -294,7 +331,7 @@ impl<const D: usize, L: Law> LinearizedMean<'_, D, L> {
         mut visit: impl FnMut(usize, usize, Vector<f64, D>),
     ) {
         let (mut sums, mut touched) = (vec![Vector::<f64, D>::zeros(); nodes], Vec::new());
-        for (cell, (members, _)) in self.of.cells.iter().enumerate() {
+        for (cell, (members, _)) in self.cells.iter().enumerate() {
             for member in members {
                 let a = self.pull(member);
                 for (node, function) in functions(member.particle as usize) {
@@ -312,7 +349,7 @@ impl<const D: usize, L: Law> LinearizedMean<'_, D, L> {
     }
 
     fn volume_changes(&self, u: &[Vector<f64, D>]) -> Vec<f64> {
-        let supports = self.of.step.supports;
+        let supports = self.step.supports;
         let mut grown = supports.pool().unspecified(supports.groups(), [0.0; LANES]);
         supports.fill_rows(u, 1, &mut grown, |group, at, grown| {
             let (a, weight) = self.of_group(group.number);
@@ -324,7 +361,7 @@ impl<const D: usize, L: Law> LinearizedMean<'_, D, L> {
         });
         let slot = |slot: u32| grown[slot as usize / LANES][slot as usize % LANES];
         let sum = |(members, _): (&[Member], f64)| members.iter().map(|member| slot(member.slot)).sum();
-        self.of.cells.iter().map(sum).collect()
+        self.cells.iter().map(sum).collect()
     }
 }
 
@@ -354,7 +391,7 @@ impl<const D: usize, L: Law> Linearized<D> for LinearizedMean<'_, D, L> {
                 let (l, out) = (at.gradient.as_flattened(), sums.gradient.as_flattened_mut());
                 let mut pulls = [0.0; LANES];
                 for (lane, &p) in group.particles.iter().enumerate() {
-                    pulls[lane] = self.of.cells.cell(p).map_or(0.0, |cell| coupling[cell] * weight[lane]);
+                    pulls[lane] = self.cells.cell(p).map_or(0.0, |cell| coupling[cell] * weight[lane]);
                     mutant!("mean dilatation: the product lacks the coupling within a cell": { pulls[lane] = 0.0; });
                 }
                 product(D, Product { form: Form::Closed, rows, l, out });

@@ -108,15 +108,15 @@ pub(crate) fn measure<const D: usize, L: Law>(
             u
         })
         .collect();
-    let (mut measured, sizes) = measure_pieces(equilibrium, dphi, &directions, spacing, bound)?;
+    let Pieces { mut measured, sizes, largest } = measure_pieces(equilibrium, dphi, &directions, spacing, bound)?;
     let tangent = equilibrium.tangent(dphi)?;
     let mut worst: f64 = 0.0;
-    for u in &directions {
+    for (u, largest) in directions.iter().zip(largest) {
         let residual = equilibrium.residual(&seeded(dphi, u))?;
         let mut dual: Field<D> = residual.iter().map(|r| r.map(|x| x.eps)).collect();
         equilibrium.clear_prescribed(&mut dual);
         let analytic = product(&tangent, u);
-        worst = worse(worst, relative(&analytic, &dual, norm(&analytic)));
+        worst = worse(worst, relative(&analytic, &dual, norm(&analytic).max(largest)));
     }
     measured.push(Measured::new("whole product", worst, bound));
     let columns = columns(equilibrium, &tangent, dphi.len());
@@ -140,17 +140,23 @@ pub(crate) fn measure<const D: usize, L: Law>(
     Ok(measured)
 }
 
-/// Each piece alone against the derivative of its residual, and the sizes of the diagonal blocks of all pieces.
+/// Each piece alone against the derivative of its residual. Terms may cancel, so the round-off of their sum is relative to the parts.
+struct Pieces {
+    measured: Vec<Measured>,
+    /// The sum of the norms of all parts of each diagonal block.
+    sizes: Vec<f64>,
+    /// The largest product of a piece in each direction.
+    largest: Vec<f64>,
+}
+
 fn measure_pieces<const D: usize, L: Law>(
     equilibrium: &Equilibrium<'_, D, L>,
     dphi: &[Vector<f64, D>],
     directions: &[Field<D>],
     spacing: f64,
     bound: Bound,
-) -> Result<(Vec<Measured>, Vec<f64>), Inadmissible> {
-    let mut measured = Vec::new();
-    // The size of each diagonal block. Its parts may cancel, so round-off scales with the sum of their norms.
-    let mut sizes = vec![0.0; dphi.len()];
+) -> Result<Pieces, Inadmissible> {
+    let (mut measured, mut sizes, mut largest) = (Vec::new(), vec![0.0; dphi.len()], vec![0.0_f64; directions.len()]);
     let pieces = equilibrium.terms.pieces();
     for &piece in &pieces {
         let frozen = equilibrium.tangent_of(piece, dphi)?;
@@ -159,12 +165,13 @@ fn measure_pieces<const D: usize, L: Law>(
         }
         let mut worst: f64 = 0.0;
         let mut products = Vec::new();
-        for u in directions {
+        for (u, largest) in directions.iter().zip(&mut largest) {
             let mut dual = equilibrium.derivative(piece, dphi, u)?;
             equilibrium.clear_prescribed(&mut dual);
             let analytic = product(&frozen, u);
             let scale = scale(equilibrium, piece, dphi, norm(&analytic), norm(u) / spacing)?;
             worst = worse(worst, relative(&analytic, &dual, scale));
+            *largest = largest.max(norm(&analytic));
             products.push(analytic);
         }
         measured.push(Measured::new(piece.name, worst, bound));
@@ -172,7 +179,7 @@ fn measure_pieces<const D: usize, L: Law>(
             measured.push(Measured::new(PRESSURE_ASYMMETRY, asymmetry(directions, &products), Bound::Reported));
         }
     }
-    Ok((measured, sizes))
+    Ok(Pieces { measured, sizes, largest })
 }
 
 type Field<const D: usize> = Vec<Vector<f64, D>>;

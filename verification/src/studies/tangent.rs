@@ -80,7 +80,10 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
         "Pieces are frozen alone and applied by the solver's product, in vector lanes and ('plain') one particle after \
          the other.",
     );
-    report.note("Diagonal blocks: relative to the sum of the sizes of their parts, which cancel where J is large.");
+    report.note(
+        "Whole product: relative to its largest piece, as in the check of a run. Diagonal blocks: relative to the sum of the sizes of their parts. \
+         Parts cancel where J is large.",
+    );
     report.note(
         "eps = 0.3, so that the lumped and the consistent mass both act; a wall holds one component of some nodes.",
     );
@@ -133,7 +136,7 @@ fn dimension<const D: usize, L: Law + Clone>(
                         let of_all = |name: &&str| measured.quantity.starts_with(name);
                         let here: &[&str] = match averaged {
                             false => &[SYMMETRY, POTENTIAL],
-                            true => &[SYMMETRY, POTENTIAL, MEAN, "whole product", "diagonal blocks"],
+                            true => &[SYMMETRY, POTENTIAL, MEAN, "damping", "whole product", "diagonal blocks"],
                         };
                         if !pressed && !here.iter().any(&of_all) {
                             continue;
