@@ -45,7 +45,7 @@ impl<const D: usize, L: Law, A> Simulation<D, L, A> {
         } else if self.has_internal_variable(PLASTIC_STRAIN) {
             // Near a limit load, multigrid takes a fourth to a sixtieth of the iterations (`docs/src/tutorial/plasticity.md`).
             (Multigrid, "the body may flow")
-        } else if !self.takes_steps_above(MIXED_STEPS) && self.bodies.iter().any(averages_pressure) {
+        } else if !self.takes_steps_above(MIXED_STEPS) && self.bodies.iter().any(suits_mixed_form) {
             (BlockJacobi, "steps are short for a body that averages its dilatation")
         } else if self.bodies.iter().any(|body| stiffness_ratio(body) > ISOCHORIC) {
             (Multigrid, "a body hardly changes its volume")
@@ -69,7 +69,7 @@ impl<const D: usize, L: Law, A> Simulation<D, L, A> {
             && !settings.scheme.follows_path()
             && !self.has_mean_stress()
             && self.takes_steps_above(shortest)
-            && self.bodies.iter().any(averages_pressure)
+            && self.bodies.iter().any(suits_mixed_form)
     }
 
     /// Whether steps are load steps, or have Courant numbers above this one.
@@ -80,8 +80,8 @@ impl<const D: usize, L: Law, A> Simulation<D, L, A> {
     }
 }
 
-/// Whether a body is nearly incompressible and averages its dilatation by cell.
-fn averages_pressure<L: Law>(body: &Body<L>) -> bool {
+/// Whether a body is nearly incompressible, and its cells average the dilatation, so that the mixed form can solve it.
+fn suits_mixed_form<L: Law>(body: &Body<L>) -> bool {
     body.averages() && stiffness_ratio(body) > NEARLY_INCOMPRESSIBLE
 }
 

@@ -38,12 +38,15 @@ impl<'a, const D: usize, L: Law> Damping<'a, D, L> {
     /// a step without motion lacks U(J), and has the stiffness of the law.
     fn stiffness(step: &Step<'a, D, L>) -> Result<LinearizedStress, Inadmissible> {
         let motion: Vec<_> = step.nodal.moved(step.supports.nodes()).collect();
-        let alphas = Alphas { discrete_gradient: step.bodies.iter().any(Body::averages), ..step.alphas };
+        let averages = step.bodies.iter().any(Body::averages);
+        mutant!("damping: particles of averaged cells have the stiffness of U(J)": averages = false);
+        let alphas = Alphas { discrete_gradient: averages, ..step.alphas };
         Stress::of(&Step { alphas, ..*step }).linearized(&motion, Part::Material)
     }
 
     /// The stiffness of averaged cells against a change of volume at φ_n.
     fn stiffness_of_cells(step: &Step<'a, D, L>) -> Option<LinearizedMean<'a, D, L>> {
+        mutant!("damping: averaged cells have no stiffness of their own": { return None; });
         let motion: Vec<_> = step.nodal.moved(step.supports.nodes()).collect();
         let alphas = Alphas { discrete_gradient: false, ..step.alphas };
         Some(MeanDilatation::of(&Step { alphas, ..*step })?.volumetric_stiffness(&motion))

@@ -106,8 +106,10 @@ fn cofactor_change<const D: usize>(a: &Tensor<f64, D>, x: &Tensor<f64, D>) -> Te
 
 impl<'a, const D: usize, L: Law> DilatationOfStep<'a, D, L> {
     pub(super) fn of(step: &Step<'a, D, L>) -> Option<Self> {
-        let cells = step.alphas.discrete_gradient.then(|| Cells::of(step.particles, step.bodies, step.supports));
-        let cells = cells??;
+        if !step.alphas.discrete_gradient {
+            return None;
+        }
+        let cells = Cells::of(step.particles, step.bodies, step.supports)?;
         let before = cells.changes_now(step.particles);
         Some(Self { step: *step, cells, before })
     }
@@ -220,7 +222,7 @@ impl<const D: usize, L: Law> Term<D> for DilatationOfStep<'_, D, L> {
             }
         });
         let stiffness = means.iter().map(|mean| mean.stiffness).collect();
-        Ok(vec![Box::new(LinearizedMean { of: self, rows, stiffness })])
+        Ok(vec![Box::new(LinearizedPressures { of: self, rows, stiffness })])
     }
 }
 
@@ -259,7 +261,7 @@ impl<const D: usize, L: Law> DilatationOfStep<'_, D, L> {
 }
 
 /// The linearised δσ.
-struct LinearizedMean<'a, const D: usize, L> {
+struct LinearizedPressures<'a, const D: usize, L> {
     of: &'a DilatationOfStep<'a, D, L>,
     /// The local part, a, and b.
     rows: Pooled<[f64; LANES]>,
@@ -267,7 +269,7 @@ struct LinearizedMean<'a, const D: usize, L> {
     stiffness: Vec<f64>,
 }
 
-impl<const D: usize, L: Law> LinearizedMean<'_, D, L> {
+impl<const D: usize, L: Law> LinearizedPressures<'_, D, L> {
     /// The local part, a and b of a group.
     fn of_group(&self, group: usize) -> [&[[f64; LANES]]; 3] {
         let count = linearized_rows(D);
@@ -306,13 +308,11 @@ impl<const D: usize, L: Law> LinearizedMean<'_, D, L> {
                 (0..LANES).for_each(|lane| grown[0][lane] += b[lane] * l[lane]);
             }
         });
-        let slot = |slot: u32| grown[slot as usize / LANES][slot as usize % LANES];
-        let sum = |(members, _): (&[Member], f64)| members.iter().map(|member| slot(member.slot)).sum();
-        self.of.cells.iter().map(sum).collect()
+        self.of.cells.sums(&grown)
     }
 }
 
-impl<const D: usize, L: Law> Linearized<D> for LinearizedMean<'_, D, L> {
+impl<const D: usize, L: Law> Linearized<D> for LinearizedPressures<'_, D, L> {
     fn product_at_points(&self, along: Along<'_, D>) -> Option<(Mode, ProductAtPoints<'_, D>)> {
         let coupling = self.coupling(along);
         Some((

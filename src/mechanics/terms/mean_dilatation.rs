@@ -95,8 +95,11 @@ struct Local<T: Real, const D: usize> {
 impl<'a, const D: usize, L: Law> MeanDilatation<'a, D, L> {
     pub(super) fn of(step: &Step<'a, D, L>) -> Option<Self> {
         // The mean stress of a step has a term of its own.
-        let cells = (!step.alphas.discrete_gradient).then(|| Cells::of(step.particles, step.bodies, step.supports));
-        Some(Self { step: *step, cells: Arc::new(cells??) })
+        if step.alphas.discrete_gradient {
+            return None;
+        }
+        let cells = Cells::of(step.particles, step.bodies, step.supports)?;
+        Some(Self { step: *step, cells: Arc::new(cells) })
     }
 
     /// U at J, which the law contains already.
@@ -359,9 +362,7 @@ impl<const D: usize, L: Law> LinearizedMean<'_, D, L> {
             }
             grown[0] = std::array::from_fn(|lane| sum[lane] * weight[lane]);
         });
-        let slot = |slot: u32| grown[slot as usize / LANES][slot as usize % LANES];
-        let sum = |(members, _): (&[Member], f64)| members.iter().map(|member| slot(member.slot)).sum();
-        self.cells.iter().map(sum).collect()
+        self.cells.sums(&grown)
     }
 }
 

@@ -44,6 +44,7 @@ const PATHS: Check = Check::Test("path::");
 const KEPT: Check = Check::Test("kept::");
 const CARRIES: Check = Check::Test("carried::");
 const TRANSFERS: Check = Check::Test("transfer::");
+const DAMPED: Check = Check::Test("damping::");
 const CELLS: Check = Check::Test("dilatation::");
 const FLOWS: Check = Check::Test("flow::");
 const BONDS: Check = Check::Test("contact::");
@@ -94,6 +95,8 @@ pub(super) const FAULTS: &[ShippedFault] = &[
     fault("stress: no geometric part without a closed form", TANGENT, POINTS),
     fault("stress: the energy lacks V_0", TANGENT, POINTS),
     fault("damping: the product has the factor of the acceleration", TANGENT, DYNAMICS),
+    fault("damping: particles of averaged cells have the stiffness of U(J)", DAMPED, POINTS),
+    fault("damping: averaged cells have no stiffness of their own", DAMPED, POINTS),
     fault("mean dilatation: the product lacks the coupling within a cell", TANGENT, POINTS),
     fault("mean dilatation: that of earlier grids is forgotten", CELLS, POINTS),
     fault("mean dilatation: means of a kept grid stay where particles were", CELLS, KEPT),
