@@ -128,6 +128,32 @@ pub fn cofactor<T: Real, const D: usize>(a: &Tensor<T, D>) -> Tensor<T, D> {
     }
 }
 
+/// The derivative of cof A along X. It is linear in X, and defined for singular A too.
+///
+/// ```
+/// use bfree::tensor::{Tensor, cofactor, cofactor_derivative};
+///
+/// // cof is homogeneous of degree 2 in 3D, so the derivative along A is 2 cof A.
+/// let a = Tensor::<f64, 3>::new(2.0, 1.0, 0.0, 0.0, 3.0, 1.0, 1.0, 0.0, 1.0);
+/// assert_eq!(cofactor_derivative(&a, &a), cofactor(&a) * 2.0);
+/// // Halves of the increment have the half derivative, to the last bit.
+/// let x = Tensor::<f64, 3>::new(0.1, -0.7, 0.3, 0.2, 0.9, -0.4, 0.8, 0.5, 0.6);
+/// assert_eq!(cofactor_derivative(&a, &(x * 2.0_f64.powi(-60))), cofactor_derivative(&a, &x) * 2.0_f64.powi(-60));
+/// ```
+#[inline(always)]
+pub fn cofactor_derivative<T: Real, const D: usize>(a: &Tensor<T, D>, x: &Tensor<T, D>) -> Tensor<T, D> {
+    match D {
+        1 => Tensor::zeros(),
+        2 => cofactor(x),
+        3 => Tensor::from_fn(|i, k| {
+            let (i1, i2, k1, k2) = ((i + 1) % 3, (i + 2) % 3, (k + 1) % 3, (k + 2) % 3);
+            let change = |i, k, l, j| a[(i, k)] * x[(l, j)] + x[(i, k)] * a[(l, j)];
+            change(i1, k1, i2, k2) - change(i1, k2, i2, k1)
+        }),
+        _ => unreachable!("D is 1, 2 or 3"),
+    }
+}
+
 /// det A for D = 1, 2, 3.
 ///
 /// ```

@@ -39,9 +39,10 @@ fn shipped_shape_functions_pass() {
     }
 }
 
-/// The fault of [`Wrong`].
+/// The fault of [`Wrong`]. A law without fault has the same type, so that what is generic is compiled once.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Fault {
+    Nothing,
     /// ℂ:X twice as large.
     Factor,
     /// ℂ treats X as symmetric.
@@ -65,8 +66,10 @@ impl Law for Wrong {
     }
 
     fn elasticity<const D: usize>(&self, at: &MaterialState<f64, D>, x: &Tensor<f64, D>) -> Tensor<f64, D> {
-        if self.fault == Fault::Factor {
-            return scaled(&self.right.elasticity(at, x), 2.0);
+        match self.fault {
+            Fault::Nothing => return self.right.elasticity(at, x),
+            Fault::Factor => return scaled(&self.right.elasticity(at, x), 2.0),
+            Fault::Symmetrisation => {}
         }
         // ΛJ² (C⁻¹:X) C⁻¹ − 2q C⁻¹ X C⁻¹
         let Lame { lambda, shear } = self.right.lame;
@@ -135,7 +138,7 @@ fn a_law_with_memory_is_judged_from_where_it_starts() {
 }
 
 /// Nine particles of one body in the middle of a grid, in motion.
-fn patch<L: Law>(law: L) -> Simulation<2, L> {
+fn patch(fault: Fault) -> Result<Simulation<2, Wrong>, LameError> {
     let mut particles = Particles::default();
     for p in 0..9 {
         let (i, k) = (f64::from(p % 3), f64::from(p / 3));
@@ -143,19 +146,20 @@ fn patch<L: Law>(law: L) -> Simulation<2, L> {
         particles.push(position, Vector::from([0.4 * k - i, 0.7 * i]), 0.09, 0.09, 0);
     }
     let grid = Grid { origin: Vector::zeros(), spacing: 0.5, cells: [6, 6] };
+    let law = wrong(fault)?;
     let bodies = vec![Body { name: "patch".into(), law, density: 1.0, dilatation: Default::default(), field: 0 }];
-    Simulation {
+    Ok(Simulation {
         settings: Settings { lumping: 0.5, ..Settings::default() },
         ..Simulation::new(grid, Bspline::Quadratic.into(), bodies, particles, Clock::new(0.01, 0))
-    }
+    })
 }
 
 #[test]
 fn the_tangent_of_a_simulation_is_judged_by_piece() -> Result<(), LameError> {
-    let report = check_tangent(&patch(NeoHookean::ciarlet(lame()?)));
+    let report = check_tangent(&patch(Fault::Nothing)?);
     assert!(report.passed(), "{report}");
     for fault in [Fault::Factor, Fault::Symmetrisation] {
-        let report = check_tangent(&patch(wrong(fault)?));
+        let report = check_tangent(&patch(fault)?);
         // Without a closed form the product uses ℂ: every piece that contains ℂ is wrong, and no other.
         assert_eq!(red(&report, 0), ["material", "stress", "whole product"], "{fault:?}\n{report}");
     }
@@ -164,7 +168,7 @@ fn the_tangent_of_a_simulation_is_judged_by_piece() -> Result<(), LameError> {
 
 #[test]
 fn a_simulation_that_cannot_be_set_up_fails_with_the_reason() -> Result<(), LameError> {
-    let mut outside = patch(NeoHookean::ciarlet(lame()?));
+    let mut outside = patch(Fault::Nothing)?;
     outside.particles.position[4][0] = -7.0;
     let report = check_tangent(&outside);
     assert!(!report.passed());

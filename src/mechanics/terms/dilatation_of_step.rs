@@ -34,7 +34,7 @@ use crate::mechanics::sweep::{Mode, Number};
 use crate::mechanics::trial::Trial;
 use crate::pooled::Pooled;
 use crate::scalar::Real;
-use crate::tensor::{Deformation, Tensor, Vector, cofactor, identity, scaled, symmetric};
+use crate::tensor::{Deformation, Tensor, Vector, cofactor, cofactor_derivative, identity, scaled, symmetric};
 
 /// The mean pressures of a step; absent without mean dilatation, and in other schemes.
 pub(crate) struct DilatationOfStep<'a, const D: usize, L> {
@@ -88,19 +88,11 @@ impl<const D: usize> Ends<f64, D> {
         let of_end = of_middle * 2.0;
         let of_strain = symmetric(&(self.ends[1].f.transpose() * of_end)) * 2.0;
         // The middle moves by half of the end: 4 · ½ = 2.
-        let of_sum =
-            (cofactor_change(&((before + after) * 0.5), &of_strain) * 2.0 + cofactor_change(&after, &of_strain)) / 6.0;
+        let of_sum = (cofactor_derivative(&((before + after) * 0.5), &of_strain) * 2.0
+            + cofactor_derivative(&after, &of_strain))
+            / 6.0;
         let of_factor = -0.5 * factor * factor * cofactor(&self.ends[1].f).dot(&of_end);
         of_middle * sum * factor + self.middle * (of_sum * factor + sum * of_factor)
-    }
-}
-
-/// The derivative of cof A along X.
-fn cofactor_change<const D: usize>(a: &Tensor<f64, D>, x: &Tensor<f64, D>) -> Tensor<f64, D> {
-    match D {
-        1 => Tensor::zeros(),
-        2 => cofactor(x),
-        _ => cofactor(&(a + x)) - cofactor(a) - cofactor(x),
     }
 }
 

@@ -6,7 +6,7 @@ use crate::mechanics::loads::PressurePoint;
 use crate::mechanics::sweep::{Number, Supports};
 use crate::mechanics::trial::Trial;
 use crate::particles::Particles;
-use crate::tensor::{Deformation, Tensor, Vector, cofactor, contract, identity};
+use crate::tensor::{Tensor, Vector, cofactor, cofactor_derivative, identity};
 
 /// Σ_Γ p cof(F) N A N_I, which has no potential.
 pub(crate) struct Pressure<'a, const D: usize> {
@@ -56,13 +56,12 @@ impl<const D: usize> Term<D> for Pressure<'_, D> {
 
     fn linearize(&self, Trial { dphi, .. }: Trial<'_, f64, D>, _: Part) -> LinearizedTerm<'_, D> {
         let linearize = |point: &PressurePoint<D>| {
-            let (p, h_r) = (point.particle, &self.particles.reference().displacement_gradient[point.particle]);
-            let at = Deformation::new(compose(&self.supports.gradient_at(p, dphi), h_r));
-            let f_inv_t = at.inverse_transpose();
+            let p = point.particle;
+            let f_r = identity::<f64, D>() + self.particles.reference().displacement_gradient[p];
             LinearizedPoint {
                 particle: p,
-                df_inv_t: f_inv_t * (identity::<f64, D>() + h_r).transpose(),
-                force: f_inv_t * point.force * at.jacobian,
+                delta_f: identity::<f64, D>() + self.supports.gradient_at(p, dphi),
+                force: cofactor(&f_r) * point.force,
             }
         };
         let points = self.points.iter().map(linearize).collect();
@@ -75,32 +74,35 @@ struct LinearizedPressure<'a, const D: usize> {
     points: Vec<LinearizedPoint<D>>,
 }
 
-/// δ(p A cof(F) N) = (A:L) w − A Lᵀ w with A = ΔF⁻ᵀ, w = p A J F⁻ᵀ N.
+/// cof F = cof ΔF cof F_r, so δ(p A cof(F) N) is the derivative of cof ΔF along L = ∇_r u, applied to p A cof(F_r) N.
 struct LinearizedPoint<const D: usize> {
     particle: usize,
-    df_inv_t: Tensor<f64, D>,
+    /// ΔF
+    delta_f: Tensor<f64, D>,
+    /// p A cof(F_r) N
     force: Vector<f64, D>,
 }
 
 impl<const D: usize> Linearized<D> for LinearizedPressure<'_, D> {
     fn add_product_at_nodes(&self, u: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
-        for LinearizedPoint { particle, df_inv_t: a, force: w } in &self.points {
-            let l = self.supports.gradient_at(*particle, u);
-            let delta = w * contract(a, &l) - a * (l.transpose() * w);
-            mutant!("loads: the tangent of a pressure has a wrong sign": delta = w * contract(a, &l) + a * (l.transpose() * w));
+        for LinearizedPoint { particle, delta_f, force } in &self.points {
+            let delta = cofactor_derivative(delta_f, &self.supports.gradient_at(*particle, u)) * force;
+            mutant!("loads: the tangent of a pressure has a wrong sign": delta = -delta);
             for (node, n, _) in self.supports.of(*particle) {
                 out[node] += delta * n;
             }
         }
     }
 
-    /// N_I (w ⊗ g − g ⊗ w), g = A ∇_r N_I
+    /// Column k is that of L = e_k ⊗ ∇_r N_I.
     fn add_blocks_of_functions(&self, functions: &FunctionsAt<'_, D>, blocks: &mut [Tensor<f64, D>]) {
-        for LinearizedPoint { particle, df_inv_t: a, force: w } in &self.points {
+        for LinearizedPoint { particle, delta_f, force } in &self.points {
             for (node, function) in functions(*particle) {
                 for k in 0..D {
-                    let g = a * function.gradient[k];
-                    (0..D).for_each(|i| blocks[node][(i, k)] += function.value[i] * (w[i] * g[k] - g[i] * w[k]));
+                    let mut l = Tensor::<f64, D>::zeros();
+                    l.set_row(k, &function.gradient[k].transpose());
+                    let column = cofactor_derivative(delta_f, &l) * force;
+                    (0..D).for_each(|i| blocks[node][(i, k)] += function.value[i] * column[i]);
                 }
             }
         }

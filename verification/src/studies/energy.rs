@@ -72,7 +72,7 @@ fn dimension<const D: usize>(name: &str, law: &Material, report: &mut Report) ->
             let size = regime.increment() * SPACING;
             let mut dphi: Vec<Vector<f64, D>> = random.field(prepared.nodes.len()).iter().map(|x| x * size).collect();
             prepared.prescribe(&mut dphi);
-            for measured in measure(&prepared.equilibrium(&simulation), &dphi, SPACING, &mut random)? {
+            for measured in measure(&prepared.equilibrium(&simulation), &dphi, &mut random)? {
                 let (of_stress, of_both) =
                     (["stress", "geometric", "material", "damping"], ["mean dilatation", "whole product", "diagonal blocks"]);
                 let quantity = measured.quantity.as_str();

@@ -131,7 +131,7 @@ fn dimension<const D: usize, L: Law + Clone>(
                     let mut dphi: Vec<Vector<f64, D>> =
                         random.field(prepared.nodes.len()).iter().map(|x| x * size).collect();
                     prepared.prescribe(&mut dphi);
-                    for measured in measure(&equilibrium, &dphi, SPACING, &mut random)? {
+                    for measured in measure(&equilibrium, &dphi, &mut random)? {
                         // The other quantities do not depend on the pressure or the mean dilatation, so they are not listed twice.
                         let of_all = |name: &&str| measured.quantity.starts_with(name);
                         let here: &[&str] = match averaged {

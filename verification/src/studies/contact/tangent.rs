@@ -9,7 +9,7 @@ use crate::report::Report;
 use crate::studies::StudyError;
 use crate::studies::tangent::{SPACING, cloud};
 use bfree::approximation::{Approximation, Bspline};
-use bfree::material::{Lame, NeoHookean};
+use bfree::material::{Lame, Material, NeoHookean};
 use bfree::mechanics::loads::{BodyContact, Curve, Facing, Motion, Obstacle, Partner, RigidBody, Rotation};
 use bfree::shape::{Ball, Block, Cone, HalfSpace, Shape};
 use bfree::simulation::Simulation;
@@ -41,10 +41,10 @@ fn shapes<const D: usize>(x: &Vector<f64, D>) -> Vec<(&'static str, Shape<D>)> {
 }
 
 fn dimension<const D: usize>(report: &mut Report) -> Result<(), StudyError> {
-    let law = NeoHookean::ciarlet(Lame::from_young_poisson(1000.0, 0.3)?);
+    let law = Material::from(NeoHookean::ciarlet(Lame::from_young_poisson(1000.0, 0.3)?));
     let mut random = Random::new(3);
     let approximation = Approximation::from(Bspline::Cubic);
-    let mut simulation: Simulation<D, NeoHookean> = cloud(law, approximation, Regime::Moderate, &mut random)?;
+    let mut simulation: Simulation<D> = cloud(law, approximation, Regime::Moderate, &mut random)?;
     simulation.loads.contacts.points = std::mem::take(&mut simulation.loads.surface).remove(0).points;
     let points = simulation.loads.contacts.points.clone();
     let middle = simulation.particles.position[points[points.len() / 2].particle];
@@ -81,7 +81,7 @@ fn dimension<const D: usize>(report: &mut Report) -> Result<(), StudyError> {
 /// Measures the tangent at a random motion that keeps the state of friction.
 fn push<const D: usize>(
     report: &mut Report,
-    simulation: &Simulation<D, NeoHookean>,
+    simulation: &Simulation<D>,
     [what, state, way]: [&str; 3],
     slip: f64,
     random: &mut Random,
@@ -92,7 +92,7 @@ fn push<const D: usize>(
         random.field(prepared.nodes.len()).iter().map(|x| x * (size * SPACING)).collect();
     prepared.prescribe(&mut dphi);
     let equilibrium = prepared.equilibrium(simulation);
-    for measured in measure(&equilibrium, &dphi, SPACING, random)? {
+    for measured in measure(&equilibrium, &dphi, random)? {
         let of_contact = ["contact", "friction", "whole product", "diagonal blocks"];
         if of_contact.contains(&measured.quantity.as_str()) {
             let labels = [&measured.quantity, what, &D.to_string(), state, way];
@@ -104,7 +104,7 @@ fn push<const D: usize>(
 
 /// Every point faces the points after and before it, which carry a place at a depth of 0.05 spacings below it.
 fn between<const D: usize>(
-    simulation: &Simulation<D, NeoHookean>,
+    simulation: &Simulation<D>,
     friction: f64,
     slip: f64,
     random: &mut Random,
@@ -129,7 +129,7 @@ fn between<const D: usize>(
 
 /// A rigid body that turns about `center`, in the midst of a turn. Its mass resists as much as all points of contact.
 fn free<const D: usize>(
-    simulation: &Simulation<D, NeoHookean>,
+    simulation: &Simulation<D>,
     center: Vector<f64, D>,
     random: &mut Random,
 ) -> RigidBody<D> {
