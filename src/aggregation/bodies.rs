@@ -2,7 +2,9 @@
 
 use super::pieces::Pieces;
 use crate::grid::indices;
-use std::collections::{BTreeMap, HashMap, HashSet};
+use crate::parallel;
+use rustc_hash::FxHashMap;
+use std::collections::{BTreeMap, HashSet};
 use std::ops::RangeInclusive;
 
 /// The part of the grid that a body occupies. Indices have three components; an axis beyond D has no cells, and index 0.
@@ -31,12 +33,12 @@ pub(super) struct Bodies {
     grid: [i64; 3],
     dimension: usize,
     cells: Vec<([i64; 3], f64)>,
-    places: HashMap<[i64; 3], usize>,
+    places: FxHashMap<[i64; 3], usize>,
     /// For each cell, the first cell of the connected piece that contains it.
     piece: Vec<usize>,
     /// For each cell, the nodes of its functions; `None` if one of these nodes is not active.
     pub(super) windows: Vec<Option<Vec<u32>>>,
-    numbers: HashMap<[i64; 3], u32>,
+    numbers: FxHashMap<[i64; 3], u32>,
 }
 
 impl Bodies {
@@ -55,7 +57,7 @@ impl Bodies {
             places,
             numbers,
         };
-        bodies.windows = bodies.cells.iter().map(|(cell, _)| bodies.window(*cell)).collect();
+        bodies.windows = parallel::map(bodies.cells.len(), &|cell| bodies.window(bodies.cells[cell].0));
         bodies.connect();
         bodies
     }
@@ -90,19 +92,19 @@ impl Bodies {
     /// The good cells: all cells filled to at least θ. While some cells have no good neighbour, the locally fullest of these cells become
     /// good as well. The nodes of a good cell are all active.
     pub(super) fn good(&self) -> Vec<usize> {
-        let may = |cell: &usize| self.windows[*cell].is_some();
-        let filled = |cell: &usize| self.cells[*cell].1 >= self.pieces.share * (1.0 - SAME);
-        let mut good: Vec<usize> = (0..self.cells.len()).filter(|cell| may(cell) && filled(cell)).collect();
-        let mut left: HashSet<usize> = (0..self.cells.len()).filter(may).collect();
+        let cells = || 0..self.cells.len();
+        let share = |cell: usize| self.cells[cell].1;
+        let mut left: Vec<bool> = self.windows.iter().map(Option::is_some).collect();
+        let mut good: Vec<usize> =
+            cells().filter(|&cell| left[cell] && share(cell) >= self.pieces.share * (1.0 - SAME)).collect();
         let mut new = good.clone();
         loop {
-            new.iter().for_each(|&cell| self.around(self.cells[cell].0, 1).for_each(|beside| _ = left.remove(&beside)));
-            let share = |cell: usize| self.cells[cell].1;
+            new.iter().for_each(|&cell| self.around(self.cells[cell].0, 1).for_each(|beside| left[beside] = false));
             let fullest = |&cell: &usize| {
-                let mut beside = self.around(self.cells[cell].0, 1).filter(|beside| left.contains(beside));
+                let mut beside = self.around(self.cells[cell].0, 1).filter(|&beside| left[beside]);
                 beside.all(|beside| share(cell) >= share(beside) * (1.0 - SAME))
             };
-            new = left.iter().copied().filter(fullest).collect();
+            new = cells().filter(|&cell| left[cell]).filter(fullest).collect();
             if new.is_empty() {
                 good.sort_unstable();
                 return good;
@@ -117,7 +119,7 @@ impl Bodies {
     }
 
     /// The good cells nearest to a node, among the connected pieces that contain the cells nearest to the node.
-    pub(super) fn nearest(&self, node: [u32; 3], good: &HashSet<usize>) -> Vec<usize> {
+    pub(super) fn nearest(&self, node: [u32; 3], good: &[bool]) -> Vec<usize> {
         let node = node.map(i64::from);
         let nearest = |may: &dyn Fn(usize) -> bool| {
             let mut found = (i64::MAX, Vec::new());
@@ -137,7 +139,7 @@ impl Bodies {
             found.1
         };
         let pieces: HashSet<usize> = nearest(&|_| true).into_iter().map(|cell| self.piece[cell]).collect();
-        let mut cells = nearest(&|cell| good.contains(&cell) && pieces.contains(&self.piece[cell]));
+        let mut cells = nearest(&|cell| good[cell] && pieces.contains(&self.piece[cell]));
         cells.sort_unstable();
         cells
     }

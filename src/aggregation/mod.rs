@@ -26,8 +26,8 @@ pub use bodies::Occupied;
 pub use followers::Followers;
 pub use pieces::Pieces;
 
+use crate::parallel;
 use bodies::Bodies;
-use std::collections::HashSet;
 
 /// The extension E in sparse rows: each outer node, the inner nodes that it follows, and their weights. E is the identity at all other
 /// nodes.
@@ -60,17 +60,21 @@ impl Extension {
     pub fn new(pieces: Pieces, occupied: &Occupied<'_>) -> Self {
         let bodies = Bodies::new(pieces, occupied);
         let good = bodies.good();
-        let inner: HashSet<u32> =
-            good.iter().flat_map(|&cell| bodies.windows[cell].iter().flatten().copied()).collect();
-        let is_good: HashSet<usize> = good.into_iter().collect();
-        let mut extension = Self { degree: pieces.degree, starts: vec![0], ..Self::default() };
-        for (number, &node) in (0..).zip(occupied.nodes).filter(|(number, _)| !inner.contains(number)) {
+        let (mut inner, mut is_good) = (vec![false; occupied.nodes.len()], vec![false; bodies.windows.len()]);
+        for cell in good {
+            is_good[cell] = true;
+            bodies.windows[cell].iter().flatten().for_each(|&node| inner[node as usize] = true);
+        }
+        let outer: Vec<u32> = (0..).zip(inner).filter(|(_, inner)| !inner).map(|(node, _)| node).collect();
+        let rows = parallel::map(outer.len(), &|place| {
+            let node = occupied.nodes[outer[place] as usize];
             let nearest = bodies.nearest(node, &is_good);
-            if nearest.is_empty() {
-                continue;
-            }
-            extension.outer.push(number);
-            for (leader, weight) in bodies.row(node, &nearest).into_iter().filter(|(_, weight)| *weight != 0.0) {
+            (!nearest.is_empty()).then(|| bodies.row(node, &nearest))
+        });
+        let mut extension = Self { degree: pieces.degree, starts: vec![0], ..Self::default() };
+        for (node, row) in outer.into_iter().zip(rows).filter_map(|(node, row)| Some((node, row?))) {
+            extension.outer.push(node);
+            for (leader, weight) in row.into_iter().filter(|(_, weight)| *weight != 0.0) {
                 extension.leaders.push(leader);
                 extension.weights.push(weight);
             }

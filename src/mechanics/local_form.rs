@@ -6,7 +6,7 @@ use crate::mechanics::tangent::Tangent;
 use crate::mechanics::terms::Along;
 use crate::solver::LocalForm;
 use crate::tensor::{Tensor, Vector};
-use std::collections::HashMap;
+use rustc_hash::FxHashMap;
 
 impl<const D: usize> Tangent<'_, D> {
     /// The tangent as a form on cells: tangent moduli and masses, summed over the particles of each cell. Terms at nodes add a block for
@@ -43,7 +43,7 @@ impl<const D: usize> Tangent<'_, D> {
             follows: self.unknowns.following_mask(self.supports.nodes()),
             ..LocalForm::default()
         };
-        let (mut places, mut cells) = (HashMap::new(), vec![[None; LANES]; self.supports.groups()]);
+        let (mut places, mut cells) = (FxHashMap::default(), vec![[None; LANES]; self.supports.groups()]);
         self.supports.each_group(|group| cells[group.number] = self.cells_of(group, &mut places, &mut form));
         form.finish_centres();
         let mut unit = At::<f64, D, D>::zero();
@@ -75,7 +75,7 @@ impl<const D: usize> Tangent<'_, D> {
     fn cells_of(
         &self,
         group: Group<'_>,
-        places: &mut HashMap<[u32; 3], usize>,
+        places: &mut FxHashMap<[u32; 3], usize>,
         form: &mut LocalForm,
     ) -> [Option<usize>; LANES] {
         let (grid, reference) = (self.supports.grid(), self.particles.reference());

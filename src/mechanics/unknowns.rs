@@ -8,8 +8,9 @@ use crate::particles::Particles;
 use crate::pooled::{Pool, Pooled};
 use crate::scalar::Real;
 use crate::tensor::{Tensor, Vector, identity};
+use rustc_hash::FxHashMap;
 use std::borrow::Cow;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 /// Upper bound of the length of a particle's domain, in cells. Material need not fill the domain of a particle that is stretched further.
 const LONGEST: f64 = 2.0;
@@ -33,7 +34,7 @@ fn of_field<const D: usize>(
     let solid = || (0..particles.len()).filter(|&p| particles.is_solid(p) && in_field(p));
     let local = |p: usize, k: usize| grid.axis(k).local(reference.position[p][k]).unwrap_or(0.0);
     let cell = |p: usize| std::array::from_fn(|k| pieces.cell(local(p, k), grid.cells[k]));
-    let mut volumes: BTreeMap<[u32; D], f64> = solid().map(|p| (cell(p), 0.0)).collect();
+    let mut volumes: FxHashMap<[u32; D], f64> = solid().map(|p| (cell(p), 0.0)).collect();
     for p in solid() {
         // The domain is a box. At F = I the box is a cube of the particle's volume. Its edge along axis k grows with |row k of F|.
         let f = identity::<f64, D>() + reference.displacement_gradient[p];

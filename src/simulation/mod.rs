@@ -32,10 +32,14 @@ use crate::mechanics::schemes::Alphas;
 use crate::mechanics::sweep::{Fields, Points, Supports};
 use crate::mechanics::transfer::Nodal;
 use crate::mechanics::unknowns::Unknowns;
+use crate::parallel;
 use crate::particles::{Body, Particles};
 use crate::pooled::Pool;
 use crate::solver::Krylov;
 use crate::tensor::Vector;
+
+/// Particles in one part of the work of a thread.
+const PART: usize = 2048;
 
 /// An implicit material point simulation in `D` dimensions.
 ///
@@ -295,14 +299,16 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// ```
     pub fn strain_energy(&self) -> f64 {
         let particles = &self.particles;
-        (0..particles.len())
-            .map(|p| {
-                let at = particles.state(p, 0.0);
-                let body = &self.bodies[particles.body[p] as usize];
-                let [more, _] = body.averaged(particles.dilatation(p), at.j);
-                particles.volume[p] * (body.law.energy(&at) + more)
-            })
-            .sum()
+        let energy = |p: usize| {
+            let at = particles.state(p, 0.0);
+            let body = &self.bodies[particles.body[p] as usize];
+            let [more, _] = body.averaged(particles.dilatation(p), at.j);
+            particles.volume[p] * (body.law.energy(&at) + more)
+        };
+        let parts = parallel::map(particles.len().div_ceil(PART), &|part| {
+            (part * PART..particles.len().min((part + 1) * PART)).map(energy).collect::<Vec<f64>>()
+        });
+        parts.iter().flatten().sum()
     }
 
     /// Gives `velocity(x_I)` to the nodes and interpolates it once to the particles, v_p = Σ N v_I (section 4.1).

@@ -6,7 +6,7 @@ use super::form::LocalForm;
 use crate::parallel;
 use crate::solver::vector::{axpy, update};
 use crate::tensor::{Tensor, Vector};
-use std::collections::HashMap;
+use rustc_hash::FxHashMap;
 
 /// Steps of the Chebyshev iteration for ([1 4 1]/6)⁻¹.
 const STEPS: usize = 3;
@@ -35,7 +35,7 @@ impl Filter {
         let fixed = form.fixed();
         let is_unknown = |node: usize| (0..D).any(|i| !fixed[node * D + i]);
         let unknowns = form.nodes.iter().enumerate().filter(|(node, _)| is_unknown(*node));
-        let numbers: HashMap<[u32; 3], u32> = unknowns.map(|(number, &at)| (at, number as u32)).collect();
+        let numbers: FxHashMap<[u32; 3], u32> = unknowns.map(|(number, &at)| (at, number as u32)).collect();
         let beside = |axis: usize, at: [u32; 3], by: u32| {
             let mut next = at;
             next[axis] = (at[axis] + by).checked_sub(1).unwrap_or(NONE);

@@ -1,6 +1,6 @@
 //! The data of an operator from which multigrid makes its coarse levels.
 
-use std::collections::HashMap;
+use rustc_hash::FxHashMap;
 
 /// An operator as a form on the cells of a grid: Σ_cells ∇w:A∇u + m w·u at one point a cell, and Σ_nodes w·B u. Lengths are in cells.
 #[derive(Clone, Debug, Default)]
@@ -53,17 +53,18 @@ impl LocalForm {
         self.prescribed.iter().zip(&self.follows).map(|(held, follows)| *held || *follows).collect()
     }
 
-    /// Sums the cells into those of the next coarser grid. Returns for each cell the coarse cell in which it lies.
-    pub(super) fn add_cells_to<const D: usize>(&self, next: &mut Self) -> Vec<usize> {
-        let (tiles, mut places) = (D.pow(4), HashMap::new());
-        let mut of_coarse = Vec::with_capacity(self.cells.len());
+    /// Sums the cells into those of the next coarser grid. Returns for each coarse cell the cells in it.
+    pub(super) fn add_cells_to<const D: usize>(&self, next: &mut Self) -> Vec<Vec<usize>> {
+        let (tiles, mut places) = (D.pow(4), FxHashMap::default());
+        let mut within: Vec<Vec<usize>> = Vec::new();
         for (cell, index) in self.cells.iter().enumerate() {
             let coarse = index.map(|i| i / 2);
             let at = *places.entry(coarse).or_insert_with(|| {
                 next.push_cell(coarse, tiles);
+                within.push(Vec::new());
                 next.cells.len() - 1
             });
-            of_coarse.push(at);
+            within[at].push(cell);
             // Lengths are in cells, so on the coarse grid a volume is smaller by 2^D, and a gradient larger by 2.
             let share = self.filled[cell] / f64::from(1 << D);
             next.filled[at] += share;
@@ -73,7 +74,7 @@ impl LocalForm {
             (0..tiles).for_each(|t| next.tangents[at * tiles + t] += 0.25 * self.tangents[cell * tiles + t]);
         }
         next.finish_centres();
-        of_coarse
+        within
     }
 }
 
@@ -89,7 +90,7 @@ mod tests {
         fine.push_cell([1, 0, 0], 1);
         (fine.centres, fine.filled) = (vec![[0.5, 0.0, 0.0], [1.125, 0.0, 0.0]], vec![1.0, 0.25]);
         let mut coarse = LocalForm::default();
-        assert_eq!(fine.add_cells_to::<1>(&mut coarse), [0, 0]);
+        assert_eq!(fine.add_cells_to::<1>(&mut coarse), [[0, 1]]);
         assert_eq!(coarse.filled, [0.625]);
         assert!((coarse.centres[0][0] - 0.5 * (0.5 + 0.25 * 1.125) / 1.25).abs() < 1e-15, "{:?}", coarse.centres);
     }

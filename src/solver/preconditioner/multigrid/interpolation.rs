@@ -2,7 +2,7 @@
 
 use crate::parallel;
 use crate::tensor::Vector;
-use std::collections::HashMap;
+use rustc_hash::FxHashMap;
 
 /// Nodes in one part of the work of a thread.
 const PART: usize = 2048;
@@ -57,8 +57,8 @@ fn between<const D: usize>(index: [u32; 3]) -> impl Iterator<Item = [u32; 3]> {
 
 impl Interpolation {
     /// The interpolation to the nodes with these indices. Returns also the indices of the coarse nodes, and their numbers.
-    pub fn to<const D: usize>(nodes: &[[u32; 3]]) -> (Self, Vec<[u32; 3]>, HashMap<[u32; 3], u32>) {
-        let (mut coarse, mut numbers) = (Vec::new(), HashMap::new());
+    pub fn to<const D: usize>(nodes: &[[u32; 3]]) -> (Self, Vec<[u32; 3]>, FxHashMap<[u32; 3], u32>) {
+        let (mut coarse, mut numbers) = (Vec::new(), FxHashMap::default());
         let mut around = Lists { starts: vec![0], entries: Vec::new() };
         for &index in nodes {
             around.entries.extend(between::<D>(index).map(|at| {

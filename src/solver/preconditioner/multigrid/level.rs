@@ -7,16 +7,18 @@ use crate::parallel;
 use crate::solver::LinearOperator;
 use crate::solver::preconditioner::block_jacobi::multiply_blocks;
 use crate::solver::preconditioner::chebyshev::largest;
-use crate::solver::preconditioner::hats::corners;
+use crate::solver::preconditioner::hats::{corners, nodes_of};
 use crate::tensor::{Tensor, Vector, identity, inverse};
 use nalgebra::DMatrix;
+use rustc_hash::FxHashMap;
 use std::borrow::Cow;
-use std::collections::HashMap;
 
 /// The middle of a stencil.
 const MIDDLE: usize = 13;
 /// Rows in one part of the work of a thread.
 const ROWS: usize = 512;
+/// Cells whose matrices are in memory at once.
+const CELLS: usize = 512;
 /// The number of a neighbour that does not exist.
 const NONE: u32 = u32::MAX;
 
@@ -72,6 +74,31 @@ fn place(from: [u32; 3], to: [u32; 3]) -> usize {
     x + 3 * y + 9 * z
 }
 
+/// The matrix of a coarse cell: the block of each pair of its corners (a, b), at a 2^D + b. Every finer cell in it is one quadrature point.
+fn cell_matrix<const D: usize>(form: &LocalForm, coarse: [u32; 3], within: &[usize]) -> Vec<Tensor<f64, D>> {
+    let mut blocks = vec![Tensor::zeros(); 1 << (2 * D)];
+    for &cell in within {
+        let hats: Vec<(f64, Vector<f64, D>)> =
+            corners::<D>(coarse, form.centres[cell].map(|x| 0.5 * x)).map(|(_, n, slope)| (n, slope)).collect();
+        let tangent = &form.tangents[cell * D.pow(4)..(cell + 1) * D.pow(4)];
+        // Gradients of the coarse hats are half as steep, so their products have the factor ¼.
+        let flux = |k: usize, slope: &Vector<f64, D>| {
+            let along =
+                |i: usize, j: usize| (0..D).map(|l| tangent[((i * D + k) * D + j) * D + l] * slope[l]).sum::<f64>();
+            Tensor::<f64, D>::from_fn(|i, j| 0.25 * along(i, j))
+        };
+        for (b, (n_b, slope_b)) in hats.iter().enumerate() {
+            let flux: [Tensor<f64, D>; D] = std::array::from_fn(|k| flux(k, slope_b));
+            for (a, (n_a, slope_a)) in hats.iter().enumerate() {
+                let block = &mut blocks[a << D | b];
+                (0..D).for_each(|k| *block += flux[k] * slope_a[k]);
+                (0..D).for_each(|i| block[(i, i)] += form.masses[cell] * n_a * n_b);
+            }
+        }
+    }
+    blocks
+}
+
 impl<const D: usize> Level<D> {
     /// The next coarser level of a form, and the form of that level.
     pub fn of(form: &LocalForm) -> (Self, LocalForm) {
@@ -91,10 +118,8 @@ impl<const D: usize> Level<D> {
             interpolation,
             ..Self::default()
         };
-        let of_coarse = form.add_cells_to::<D>(&mut next);
-        for (cell, &at) in of_coarse.iter().enumerate() {
-            level.add_cell(form, cell, &next, at, &numbers);
-        }
+        let within = form.add_cells_to::<D>(&mut next);
+        level.add_cells(form, &next, &within, &numbers);
         level.add_nodes(form, &mut next);
         level.follow(form, &mut next);
         level.hold_empty(&next);
@@ -140,30 +165,25 @@ impl<const D: usize> Level<D> {
         next.blocks = bytemuck::cast_slice(&lumped).to_vec();
     }
 
-    /// Adds a cell of the finer grid, as one quadrature point in the coarse cell `at`.
-    fn add_cell(
+    /// Adds the cells. `within` are the finer cells in each cell.
+    fn add_cells(
         &mut self,
         form: &LocalForm,
-        cell: usize,
         next: &LocalForm,
-        at: usize,
-        numbers: &HashMap<[u32; 3], u32>,
+        within: &[Vec<usize>],
+        numbers: &FxHashMap<[u32; 3], u32>,
     ) {
-        let tiles = D.pow(4);
-        let corners: Vec<_> = corners::<D>(next.cells[at], form.centres[cell].map(|x| 0.5 * x))
-            .filter_map(|(node, n, slope)| Some((*numbers.get(&node)? as usize, n, slope)))
-            .collect();
-        let tangent = &form.tangents[cell * tiles..(cell + 1) * tiles];
-        for &(b, n_b, slope_b) in &corners {
-            for &(a, n_a, slope_a) in &corners {
-                let entry = &mut self.entries[a][place(next.nodes[a], next.nodes[b])];
-                for (i, j) in (0..D).flat_map(|i| (0..D).map(move |j| (i, j))) {
-                    for (k, l) in (0..D).flat_map(|k| (0..D).map(move |l| (k, l))) {
-                        let a_ikjl = tangent[((i * D + k) * D + j) * D + l];
-                        entry[(i, j)] += 0.25 * slope_a[k] * a_ikjl * slope_b[l];
+        for first in (0..within.len()).step_by(CELLS) {
+            let count = CELLS.min(within.len() - first);
+            let matrices = parallel::map(count, &|k| cell_matrix::<D>(form, next.cells[first + k], &within[first + k]));
+            for (cell, matrix) in next.cells[first..].iter().zip(matrices) {
+                let corners: Vec<_> =
+                    nodes_of::<D>(*cell).map(|node| numbers.get(&node).map(|&number| number as usize)).collect();
+                for (pair, block) in matrix.into_iter().enumerate() {
+                    if let (Some(a), Some(b)) = (corners[pair >> D], corners[pair % (1 << D)]) {
+                        self.entries[a][place(next.nodes[a], next.nodes[b])] += block;
                     }
                 }
-                (0..D).for_each(|i| entry[(i, i)] += form.masses[cell] * n_a * n_b);
             }
         }
     }

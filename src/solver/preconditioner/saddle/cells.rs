@@ -4,7 +4,7 @@ use crate::aggregation::{Extension, Followers, Occupied, Pieces};
 use crate::solver::preconditioner::LocalForm;
 use crate::solver::preconditioner::hats::corners;
 use crate::tensor::{Tensor, Vector};
-use std::collections::{HashMap, HashSet};
+use rustc_hash::{FxHashMap, FxHashSet};
 
 /// A cell with more than this share of its volume counts as full.
 const FULL: f64 = 0.999;
@@ -45,7 +45,7 @@ impl PressureCells {
     /// v̂ of every cell: v²/(G B_c K_II⁻¹ B_cᵀ), divided by the median of its ratio to v in full cells.
     pub(super) fn effective_volumes(&self) -> Vec<f64> {
         let (cells, occupied) = (self, &self.occupied);
-        let full: HashSet<[u32; 3]> = occupied
+        let full: FxHashSet<[u32; 3]> = occupied
             .cells
             .iter()
             .zip(&occupied.filled)
@@ -73,7 +73,7 @@ impl PressureCells {
     /// The volume change of each cell under a motion of each hat function, by cell and node. Outer nodes follow inner ones.
     pub(super) fn pulls<const D: usize>(&self) -> Vec<(u32, u32, Vector<f64, D>)> {
         let (cells, occupied) = (self, &self.occupied);
-        let numbers: HashMap<[u32; 3], u32> =
+        let numbers: FxHashMap<[u32; 3], u32> =
             (0..).zip(&occupied.nodes).map(|(number, &index)| (index, number)).collect();
         let mut followers = Followers::<D>::default();
         if occupied.aggregated {

@@ -5,7 +5,7 @@ use crate::solver::LinearOperator;
 use crate::solver::preconditioner::chebyshev::{Chebyshev, largest, smooth};
 use crate::solver::preconditioner::hats::nodes_of;
 use crate::tensor::{Tensor, Vector};
-use std::collections::HashMap;
+use rustc_hash::FxHashMap;
 
 /// Bounds of the degree of the polynomials that invert coupled parts of the Schur complement. Between them it is the number of cells across the
 /// grid.
@@ -141,7 +141,7 @@ impl<const D: usize> Schur<D> {
         let occupied = Some(&self.cells.occupied).filter(|_| self.cells.inertia)?;
         let blocks: &[Tensor<f64, D>] = bytemuck::cast_slice(&occupied.blocks);
         let mut masses: Vec<f64> = blocks.iter().map(|block| block[(0, 0)]).collect();
-        let numbers: HashMap<[u32; 3], usize> = occupied.nodes.iter().copied().zip(0..).collect();
+        let numbers: FxHashMap<[u32; 3], usize> = occupied.nodes.iter().copied().zip(0..).collect();
         for (index, mass) in occupied.cells.iter().zip(&occupied.masses) {
             for node in nodes_of::<D>(*index).filter_map(|corner| numbers.get(&corner)) {
                 masses[*node] += mass / f64::from(1 << D);
@@ -175,7 +175,7 @@ impl<const D: usize> Schur<D> {
 
     /// Adds the means over the cells at each corner.
     fn take_means(&mut self, effective: &[f64], part: &mut Coupled<D>) {
-        let mut numbers = HashMap::new();
+        let mut numbers = FxHashMap::default();
         for (cell, index) in self.cells.index.iter().enumerate() {
             let (v, shear) = (self.cells.volume[cell], self.cells.shear[cell]);
             let m = v / (f64::from(2 << D) * shear * effective[cell]);
