@@ -52,9 +52,9 @@ enum Command {
         /// Draw the snapshot nearest to this time [default: the last].
         #[arg(long, value_name = "T", allow_negative_numbers = true, conflicts_with = "movie")]
         time: Option<f64>,
-        /// The format of the pictures [default: both].
-        #[arg(long, value_parser = ["svg", "png"], conflicts_with = "movie")]
-        format: Option<String>,
+        /// The format of the pictures.
+        #[arg(long, value_parser = ["both", "svg", "png"], default_value = "both", conflicts_with = "movie")]
+        format: String,
     },
     /// Print the JSON schema of scenes.
     Schema,
@@ -75,7 +75,7 @@ fn main() -> ExitCode {
         Command::Newton(newton) => newton.execute(),
         Command::Plot { directory, movie, field, view, time, format } => {
             let mut look = Look { field, view, time, ..Look::default() };
-            look.formats.retain(|one| format.as_deref().is_none_or(|format| format == *one));
+            look.formats.retain(|one| format == "both" || format == *one);
             plot(&directory, movie.as_deref(), &look)
         }
         Command::Schema => print_schema(),

@@ -65,7 +65,9 @@ fn a_picture_shows_what_is_asked_for() -> Result<(), Failure> {
     let picture = || std::fs::read_to_string(directory.path().join("particles.svg"));
     // Snapshots are 0.5 apart.
     assert!(picture()?.contains(">Stress xx, t = 0.5<"), "{}", picture()?);
-    assert_eq!(plot(&[])?.0, Some(0));
+    let (code, drawn, text) = plot(&["--format", "both"])?;
+    assert!(code == Some(0) && drawn.contains("particles.svg") && drawn.contains("particles.png"), "{text}{drawn}");
+    assert_eq!(plot(&[])?, (code, drawn, text));
     assert!(picture()?.contains(">Von Mises stress, t = 2<"));
     let (code, _, text) = plot(&["--field", "stress_xq"])?;
     assert!(code == Some(2) && text.contains("\"stress_xq\"") && text.contains("stress_xy"), "{text}");
