@@ -23,10 +23,21 @@ pub(crate) fn several() -> bool {
     threads() > 1
 }
 
-/// Runs `f` on a thread of the pool. There, shared work begins at once. From any other thread it waits for a thread of the pool to wake up, and in
-/// the end for its own: some 50 µs, thousands of times a second.
-pub(crate) fn within<R: Send>(f: impl FnOnce() -> R + Send) -> R {
-    if several() { rayon::scope(|_| f()) } else { f() }
+/// Runs `f` on a thread of the pool. Shared work begins there at once. On any other thread, every piece of shared work first wakes a thread of the
+/// pool, and at its end that thread wakes the caller.
+///
+/// A function that must run on its own thread does not belong here: Python's check for Ctrl-C, for example. The pool does not survive `fork`.
+///
+/// ```
+/// use bfree::parallel::in_pool;
+///
+/// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+/// let mut simulation = scene.build::<2>("scenes".as_ref())?;
+/// assert!(in_pool(|| simulation.advance())?.newton.history.iterations.len() > 1);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn in_pool<R: Send>(f: impl FnOnce() -> R + Send) -> R {
+    rayon::scope(|_| f())
 }
 
 /// Locks a mutex. The data stays usable after a thread panicked while it held the lock.
@@ -91,6 +102,13 @@ impl<E> First<E> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn work_in_the_pool_runs_on_one_of_its_threads() {
+        assert_eq!(rayon::current_thread_index(), None);
+        let [outer, inner] = in_pool(|| [rayon::current_thread_index(), in_pool(rayon::current_thread_index)]);
+        assert!(outer.is_some() && inner == outer, "{outer:?}, {inner:?}");
+    }
 
     #[test]
     fn everything_is_done_once_and_in_its_place() {

@@ -136,7 +136,7 @@ pub fn cofactor<T: Real, const D: usize>(a: &Tensor<T, D>) -> Tensor<T, D> {
 /// // cof is homogeneous of degree 2 in 3D, so the derivative along A is 2 cof A.
 /// let a = Tensor::<f64, 3>::new(2.0, 1.0, 0.0, 0.0, 3.0, 1.0, 1.0, 0.0, 1.0);
 /// assert_eq!(cofactor_derivative(&a, &a), cofactor(&a) * 2.0);
-/// // Halves of the increment have the half derivative, to the last bit.
+/// // The derivative is linear in X to the last bit: an X that is 2⁻⁶⁰ times as large has a derivative that is 2⁻⁶⁰ times as large.
 /// let x = Tensor::<f64, 3>::new(0.1, -0.7, 0.3, 0.2, 0.9, -0.4, 0.8, 0.5, 0.6);
 /// assert_eq!(cofactor_derivative(&a, &(x * 2.0_f64.powi(-60))), cofactor_derivative(&a, &x) * 2.0_f64.powi(-60));
 /// ```

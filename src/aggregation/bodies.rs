@@ -94,17 +94,18 @@ impl Bodies {
     pub(super) fn good(&self) -> Vec<usize> {
         let cells = || 0..self.cells.len();
         let share = |cell: usize| self.cells[cell].1;
-        let mut left: Vec<bool> = self.windows.iter().map(Option::is_some).collect();
+        // Cells that may be good, and have no good cell beside them yet.
+        let mut alone: Vec<bool> = self.windows.iter().map(Option::is_some).collect();
         let mut good: Vec<usize> =
-            cells().filter(|&cell| left[cell] && share(cell) >= self.pieces.share * (1.0 - SAME)).collect();
+            cells().filter(|&cell| alone[cell] && share(cell) >= self.pieces.share * (1.0 - SAME)).collect();
         let mut new = good.clone();
         loop {
-            new.iter().for_each(|&cell| self.around(self.cells[cell].0, 1).for_each(|beside| left[beside] = false));
+            new.iter().for_each(|&cell| self.around(self.cells[cell].0, 1).for_each(|beside| alone[beside] = false));
             let fullest = |&cell: &usize| {
-                let mut beside = self.around(self.cells[cell].0, 1).filter(|&beside| left[beside]);
+                let mut beside = self.around(self.cells[cell].0, 1).filter(|&beside| alone[beside]);
                 beside.all(|beside| share(cell) >= share(beside) * (1.0 - SAME))
             };
-            new = cells().filter(|&cell| left[cell]).filter(fullest).collect();
+            new = cells().filter(|&cell| alone[cell]).filter(fullest).collect();
             if new.is_empty() {
                 good.sort_unstable();
                 return good;

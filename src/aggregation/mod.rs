@@ -66,8 +66,8 @@ impl Extension {
             bodies.windows[cell].iter().flatten().for_each(|&node| inner[node as usize] = true);
         }
         let outer: Vec<u32> = (0..).zip(inner).filter(|(_, inner)| !inner).map(|(node, _)| node).collect();
-        let rows = parallel::map(outer.len(), &|place| {
-            let node = occupied.nodes[outer[place] as usize];
+        let rows = parallel::map(outer.len(), &|row| {
+            let node = occupied.nodes[outer[row] as usize];
             let nearest = bodies.nearest(node, &is_good);
             (!nearest.is_empty()).then(|| bodies.row(node, &nearest))
         });

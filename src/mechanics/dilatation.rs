@@ -167,8 +167,8 @@ impl Cells {
 
     /// The sum over the members of every cell, of numbers stored by group and lane.
     pub fn sums(&self, of_slots: &[[f64; LANES]]) -> Vec<f64> {
-        let slot = |slot: usize| of_slots[slot / LANES][slot % LANES];
-        self.iter().map(|(members, _)| members.iter().map(|member| slot(member.slot as usize)).sum()).collect()
+        let number = |slot: usize| of_slots[slot / LANES][slot % LANES];
+        self.iter().map(|(members, _)| members.iter().map(|member| number(member.slot as usize)).sum()).collect()
     }
 
     /// The cell of a particle, if it has one.

@@ -3,6 +3,7 @@
 use bfree::checkpoint::Checkpoints;
 use bfree::clock::Clock;
 use bfree::output::Recorder;
+use bfree::parallel::in_pool;
 use bfree::simulation::{AdvanceError, Simulation};
 use std::error::Error;
 use std::sync::Arc;
@@ -83,7 +84,8 @@ impl<const D: usize> Steps<D> {
                     return Ok(None);
                 }
             }
-            match self.simulation.advance() {
+            let simulation = &mut self.simulation;
+            match in_pool(|| simulation.advance()) {
                 Ok(step) => self.recorder.record(&self.simulation, &step)?,
                 // The next round of the loop handles the interruption.
                 Err(error) if error.cause.is_stopped() => {}

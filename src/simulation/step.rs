@@ -9,7 +9,6 @@ use crate::mechanics::sweep::Supports;
 use crate::mechanics::transfer::{Nodal, Update};
 use crate::mechanics::trial::Trial;
 use crate::mechanics::unknowns::Unknowns;
-use crate::parallel;
 use crate::phases::Phase;
 use crate::solver::NewtonReport;
 
@@ -34,7 +33,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// # Errors
     /// No equilibrium was found, or a particle would leave the grid. The simulation is then as before the call.
     pub fn step(&mut self) -> Result<StepReport<D>, StepError> {
-        parallel::within(|| self.attempt(&mut Spent::nothing()))
+        self.attempt(&mut Spent::nothing())
     }
 
     /// A step like [`Self::step`]. `spent` counts the work, also if the step fails.
@@ -184,7 +183,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         loop {
             let (time, dt) = (self.clock.time(), self.clock.step());
             let mut spent = Spent::nothing();
-            let cause = match parallel::within(|| self.attempt(&mut spent)) {
+            let cause = match self.attempt(&mut spent) {
                 Ok(report) => return Ok(StepReport { failed, ..report }),
                 Err(cause) => cause,
             };

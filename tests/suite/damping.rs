@@ -69,8 +69,8 @@ fn damping_of_averaged_cells_takes_energy_in_every_step() -> Result<(), Failure>
     Ok(())
 }
 
-/// A column is pressed: with and without averages, and in two schemes, it loses the same energy. Then it is released, with new grids on the way, and
-/// comes to rest. Cells that were compressed before a reset lose digits there.
+/// A column that is pressed loses the same energy with and without averages, and in two schemes. After release it comes to rest, with new grids on
+/// the way. Cells that were compressed before a reset lose digits there.
 #[test]
 fn averaged_cells_are_damped_like_particles_in_all_schemes_and_to_rest() -> Result<(), Failure> {
     let column = |scheme: &str, volumetric: &str, reset: Value| -> Result<Simulation<1>, Failure> {

@@ -346,7 +346,7 @@ fn the_potential_without_loads_is_a_sum_of_nothing_negative() -> Result<(), Fail
     Ok(())
 }
 
-/// The area vector is a polynomial of F, so the tangent of a pressure has all digits at a particle that is pressed flat.
+/// The area vector is a polynomial of F, so the tangent of a pressure has all digits at a particle that is pressed flat. In 1D it is zero.
 fn a_pressure_acts_on_flat_particles<const D: usize>() -> Result<(), Failure> {
     let mut cloud = truthful::<D>(1.0)?;
     let normal = Vector::<f64, D>::from_fn(|k, _| 1.0 + irregular(k)).normalize();
@@ -357,20 +357,20 @@ fn a_pressure_acts_on_flat_particles<const D: usize>() -> Result<(), Failure> {
     let piece = equilibrium.terms.pieces().into_iter().find(|piece| piece.name == "follower pressure");
     let piece = piece.ok_or("no pressure")?;
     let tangent = equilibrium.tangent_of(piece, &dphi)?;
-    let apart = |u: &[Vector<f64, D>]| -> Result<_, Failure> {
+    let checked = |u: &[Vector<f64, D>]| -> Result<_, Failure> {
         let (mut product, dual) = (vec![Vector::zeros(); u.len()], equilibrium.derivative(piece, &dphi, u)?);
         tangent.product(u, &mut product);
         let apart: Vec<_> = product.iter().zip(&dual).map(|(a, b)| a - b).collect();
-        assert!(norm(&apart) <= 1e-15 * norm(&dual), "{D}D: {} of {}", norm(&apart), norm(&dual));
+        assert!(norm(&apart) <= 1e-14 * norm(&dual), "{D}D: {} of {}", norm(&apart), norm(&dual));
         Ok(product)
     };
-    apart(&u)?;
+    checked(&u)?;
     let blocks = tangent.diagonal_blocks();
-    for (node, n, _) in cloud.supports.of(3) {
+    for ((node, ..), k) in cloud.supports.of(3).flat_map(|of_node| (0..D).map(move |k| (of_node, k))) {
         let mut unit = vec![Vector::zeros(); u.len()];
-        unit[node][0] = n;
-        let column = apart(&unit)?[node] / n;
-        assert!((column - blocks[node].column(0)).norm() <= 1e-15 * blocks[node].norm(), "{D}D, node {node}");
+        unit[node][k] = 1.0;
+        let column = checked(&unit)?[node];
+        assert!((column - blocks[node].column(k)).norm() <= 1e-14 * blocks[node].norm(), "{D}D, node {node}");
     }
     Ok(())
 }

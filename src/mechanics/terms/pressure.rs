@@ -94,7 +94,7 @@ impl<const D: usize> Linearized<D> for LinearizedPressure<'_, D> {
         }
     }
 
-    /// Column k is that of L = e_k ⊗ ∇_r N_I.
+    /// Column k of a block is N_I times the derivative along L = e_k ⊗ ∇_r N_I.
     fn add_blocks_of_functions(&self, functions: &FunctionsAt<'_, D>, blocks: &mut [Tensor<f64, D>]) {
         for LinearizedPoint { particle, delta_f, force } in &self.points {
             for (node, function) in functions(*particle) {

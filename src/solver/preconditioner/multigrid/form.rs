@@ -56,15 +56,15 @@ impl LocalForm {
     /// Sums the cells into those of the next coarser grid. Returns for each coarse cell the cells in it.
     pub(super) fn add_cells_to<const D: usize>(&self, next: &mut Self) -> Vec<Vec<usize>> {
         let (tiles, mut places) = (D.pow(4), FxHashMap::default());
-        let mut within: Vec<Vec<usize>> = Vec::new();
+        let mut finer: Vec<Vec<usize>> = Vec::new();
         for (cell, index) in self.cells.iter().enumerate() {
             let coarse = index.map(|i| i / 2);
             let at = *places.entry(coarse).or_insert_with(|| {
                 next.push_cell(coarse, tiles);
-                within.push(Vec::new());
+                finer.push(Vec::new());
                 next.cells.len() - 1
             });
-            within[at].push(cell);
+            finer[at].push(cell);
             // Lengths are in cells, so on the coarse grid a volume is smaller by 2^D, and a gradient larger by 2.
             let share = self.filled[cell] / f64::from(1 << D);
             next.filled[at] += share;
@@ -74,7 +74,7 @@ impl LocalForm {
             (0..tiles).for_each(|t| next.tangents[at * tiles + t] += 0.25 * self.tangents[cell * tiles + t]);
         }
         next.finish_centres();
-        within
+        finer
     }
 }
 

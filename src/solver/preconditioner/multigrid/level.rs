@@ -74,10 +74,11 @@ fn place(from: [u32; 3], to: [u32; 3]) -> usize {
     x + 3 * y + 9 * z
 }
 
-/// The matrix of a coarse cell: the block of each pair of its corners (a, b), at a 2^D + b. Every finer cell in it is one quadrature point.
-fn cell_matrix<const D: usize>(form: &LocalForm, coarse: [u32; 3], within: &[usize]) -> Vec<Tensor<f64, D>> {
+/// The matrix of a coarse cell: the block of each pair (a, b) of the cell's corners, at a 2^D + b. Each of the finer cells in the coarse cell is
+/// one quadrature point.
+fn cell_matrix<const D: usize>(form: &LocalForm, coarse: [u32; 3], finer: &[usize]) -> Vec<Tensor<f64, D>> {
     let mut blocks = vec![Tensor::zeros(); 1 << (2 * D)];
-    for &cell in within {
+    for &cell in finer {
         let hats: Vec<(f64, Vector<f64, D>)> =
             corners::<D>(coarse, form.centres[cell].map(|x| 0.5 * x)).map(|(_, n, slope)| (n, slope)).collect();
         let tangent = &form.tangents[cell * D.pow(4)..(cell + 1) * D.pow(4)];
@@ -118,8 +119,8 @@ impl<const D: usize> Level<D> {
             interpolation,
             ..Self::default()
         };
-        let within = form.add_cells_to::<D>(&mut next);
-        level.add_cells(form, &next, &within, &numbers);
+        let finer = form.add_cells_to::<D>(&mut next);
+        level.add_cells(form, &next, &finer, &numbers);
         level.add_nodes(form, &mut next);
         level.follow(form, &mut next);
         level.hold_empty(&next);
@@ -165,17 +166,17 @@ impl<const D: usize> Level<D> {
         next.blocks = bytemuck::cast_slice(&lumped).to_vec();
     }
 
-    /// Adds the cells. `within` are the finer cells in each cell.
+    /// Adds the matrices of the coarse cells to the stencils. `finer[c]` lists the finer cells in the coarse cell c.
     fn add_cells(
         &mut self,
         form: &LocalForm,
         next: &LocalForm,
-        within: &[Vec<usize>],
+        finer: &[Vec<usize>],
         numbers: &FxHashMap<[u32; 3], u32>,
     ) {
-        for first in (0..within.len()).step_by(CELLS) {
-            let count = CELLS.min(within.len() - first);
-            let matrices = parallel::map(count, &|k| cell_matrix::<D>(form, next.cells[first + k], &within[first + k]));
+        for first in (0..finer.len()).step_by(CELLS) {
+            let count = CELLS.min(finer.len() - first);
+            let matrices = parallel::map(count, &|k| cell_matrix::<D>(form, next.cells[first + k], &finer[first + k]));
             for (cell, matrix) in next.cells[first..].iter().zip(matrices) {
                 let corners: Vec<_> =
                     nodes_of::<D>(*cell).map(|node| numbers.get(&node).map(|&number| number as usize)).collect();
