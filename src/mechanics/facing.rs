@@ -17,7 +17,7 @@ pub(crate) const REACH: u32 = 2;
 pub(crate) const DEEPEST: f64 = 0.5;
 
 /// The extent of a piece of surface around its point, in half edges of a square of the same area. The point of a Gauss rule need not be the
-/// middle of its piece: two points leave 1.16, and three points in 3D 1.26.
+/// middle of its piece: two points along an axis leave 1.16.
 const EXTENT: f64 = 1.3;
 
 /// Distances that differ by less than this many spacings count as equal, so that rounding does not choose a point.

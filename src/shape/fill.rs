@@ -22,7 +22,7 @@ pub enum Fill {
     /// part of the cell in the shape. For linear, cubic and LME functions (LME: p = 3), a cut cell has up to (p + 1)^D points. For
     /// quadratic functions, each half, quarter or eighth of the cell has up to (p + 1)^D points. If moment fitting finds no points, and for
     /// shapes of triangles, each particle again stands for the part of its box, with boxes of half the size. A part that is itself a box
-    /// has as many Gauss points as a whole cell. In Gauss layout, a loaded surface has two points for each side in half a cell, and three
+    /// has as many Gauss points as a whole cell. In Gauss layout, a loaded surface has two points for each side in half a cell, and four
     /// in 3D.
     #[default]
     Cut,

@@ -4,7 +4,7 @@
 //!
 //! The moments are sums over the simplices of the cut box, and over the gap between their planes and a curved surface. Volumes with these
 //! moments exist at no more points than there are products (Tchakaloff's theorem; Davis, Math. Comput. 21, 1967). Non-negative least
-//! squares finds these volumes. In each box, a surface has D points with the centroid and the second moments of the surface.
+//! squares finds these volumes. In each box, a surface has 2^(D−1) points with the centroid and the second moments of the surface.
 
 use super::cut::{End, Facet, Piece};
 use super::moments::{few, in_simplex, whole_box};
@@ -101,7 +101,7 @@ impl<const D: usize> Shape<D> {
         height
     }
 
-    /// Quadrature points on the surface in a box, and in `region` if given: D points for each side of the solid there. The points match
+    /// Quadrature points on the surface in a box, and in `region` if given: 2^(D−1) points for each side of the solid there. The points match
     /// those of [`Fill::Cut`](super::Fill) in Gauss layout.
     ///
     /// ```
@@ -133,15 +133,15 @@ impl<const D: usize> Shape<D> {
 }
 
 impl<const D: usize> Facet<D> {
-    /// D points with equal shares of the area, and with the centroid, spread and turn of the facet. On a flat facet the points are exact
-    /// for polynomials of degree two. On a convex facet the points lie in it.
+    /// 2^(D−1) points with equal shares of the area, and with the centroid, spread and turn of the facet. On a flat facet the points are exact
+    /// for polynomials of degree two. On a rectangle along the axes they are Gauss's points, exact for products of cubic polynomials. On a
+    /// convex facet the points lie in it.
     fn points(&self) -> Vec<Self> {
-        // q, the corners of a regular simplex: Σ q = 0 and Σ q qᵀ = D I.
-        let (one, half, third) = (1.0, 0.5_f64.sqrt(), 1.5_f64.sqrt());
+        // q, the ends of a segment or the corners of a square: the mean of q is 0, and that of q qᵀ is I.
         let corners: &[[f64; 2]] = match D {
             1 => &[[0.0, 0.0]],
-            2 => &[[one, 0.0], [-one, 0.0]],
-            _ => &[[2.0 * half, 0.0], [-half, third], [-half, -third]],
+            2 => &[[1.0, 0.0], [-1.0, 0.0]],
+            _ => &[[1.0, 1.0], [-1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]],
         };
         // The facet is a graph over the axes a and b, across the axis nearest to its normal. The spread along a and b is L Lᵀ: x = L q, and
         // n − n̄ = (L⁻¹ turn)ᵀ q.
@@ -163,7 +163,7 @@ impl<const D: usize> Facet<D> {
             Self {
                 position: self.position + by,
                 normal: self.normal + turned * *p + over(row(b) - turned * skew, second) * *q,
-                area: self.area / D as f64,
+                area: self.area / corners.len() as f64,
                 spread: Tensor::zeros(),
                 turn: Tensor::zeros(),
             }
@@ -214,6 +214,30 @@ mod tests {
         let cylinder = Cone::new(ends, [0.2, 0.2]).unwrap();
         for shape in [ball, holed.into(), cylinder.into(), turned()] {
             has_moments_of_all(&shape, 3, 4);
+        }
+    }
+
+    /// ∫ y³ z² dA and the like over every box of a face, part of which is cut off.
+    #[test]
+    fn points_of_a_face_integrate_products_of_cubics() {
+        let block: Shape<3> = Block { min: Vector::repeat(0.0), max: Vector::from([1.0, 0.9, 0.7]) }.into();
+        for i in indices([1, 2, 2]) {
+            let lower = Vector::from([0.5, 0.5 * i[1] as f64, 0.5 * i[2] as f64]);
+            let points = block.surface_points(None, &GridBox { lower, edges: Vector::repeat(0.5), spacing: 1.0 });
+            let face: Vec<_> = points.iter().filter(|point| point.normal[0] > 0.5).collect();
+            for powers in indices([4, 4]) {
+                let sum: f64 = face
+                    .iter()
+                    .map(|at| at.area * (1..3).map(|k| at.position[k].powi(powers[k - 1] as i32)).product::<f64>())
+                    .sum();
+                let along = |k: usize| {
+                    let (from, to) = (lower[k], (lower[k] + 0.5).min([1.0, 0.9, 0.7][k]));
+                    let power = powers[k - 1] as i32 + 1;
+                    (to.powi(power) - from.powi(power)) / f64::from(power)
+                };
+                let exact = along(1) * along(2);
+                assert!((sum / exact - 1.0).abs() < 1e-12, "{i:?}, {powers:?}: {sum} {exact}");
+            }
         }
     }
 

@@ -266,3 +266,31 @@ fn gravity_follows_its_profile() -> Result<(), Failure> {
     assert!((gained - given).norm() < 1e-9 * given.norm(), "{gained} for {given}");
     Ok(())
 }
+
+/// Quadrature points of faces and particles match, so a uniform load on a cube strains all particles alike. Particles at edges and corners would
+/// show if they did not: functions there are products of cubic polynomials in the plane of the face.
+#[test]
+fn a_cube_under_uniform_loads_has_one_strain() -> Result<(), Failure> {
+    let faces = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
+    for (degree, size) in [(1, 1.0), (2, 1.0), (3, 1.0), (3, 1.15)] {
+        let on = |normal: &[i32; 3]| json!({ "half_space": { "point": normal.map(|n| f64::from(n) * size), "normal": normal.map(|n| -n) } });
+        let pressed: Vec<_> =
+            faces.iter().map(|normal| json!({ "body": "cube", "region": on(normal), "pressure": 5 })).collect();
+        let pulled = json!([{ "body": "cube", "region": on(&faces[0]), "traction": [5, 0, 0] }]);
+        for (load, of) in [("pressures", json!(pressed)), ("tractions", pulled)] {
+            let body = json!({ "name": "cube", "density": 1, "shape": { "box": { "min": [0, 0, 0], "max": [size, size, size] } },
+                               "material": { "neo_hookean": { "young": 1000, "poisson": 0.3 } } });
+            let approximation = if degree == 1 { json!("linear") } else { json!({ "bspline": { "degree": degree } }) };
+            let mut simulation: Simulation<3> = built(&json!({
+                "grid": { "size": [2, 2, 2], "spacing": 0.5 }, "time": { "step": 1, "end": 1, "scheme": "none" }, "bodies": [body],
+                "boundary": { "left": "sliding", "bottom": "sliding", "back": "sliding" }, "approximation": approximation,
+                "solver": { "newton": { "tolerance": 1e-12 } }, load: of
+            }))?;
+            simulation.step()?;
+            let strains = &simulation.particles.displacement_gradient;
+            let apart = strains.iter().map(|h| (h - strains[0]).norm() / strains[0].norm()).fold(0.0, f64::max);
+            assert!(apart < 1e-8 && strains[0].norm() > 1e-3, "degree {degree}, {size}, {load}: {apart:e}");
+        }
+    }
+    Ok(())
+}
