@@ -5,7 +5,7 @@ use super::history::{Cost, Energies};
 use super::losses::{Cause, Losses};
 use super::path::{self, Event, Followed};
 use crate::simulation::{Settings, Sharing};
-use crate::solver::NewtonSettings;
+use crate::solver::{NewtonSettings, Preconditioning};
 use serde::{Deserialize, Serialize};
 
 /// Created energy, as a fraction of the largest total energy so far, above which there is a warning.
@@ -119,6 +119,16 @@ pub(crate) struct Watched<'a> {
     pub stagnated: usize,
 }
 
+/// What makes linear systems easier to solve, and is not set yet; each entry with a comma.
+fn solver_advice(settings: &Settings) -> String {
+    let aggregation = if settings.aggregation { "" } else { "set aggregation = true for cut cells, " };
+    let multigrid = match settings.preconditioner {
+        Preconditioning::Multigrid => "",
+        _ => "try solver.krylov.preconditioner = \"multigrid\", ",
+    };
+    format!("{aggregation}{multigrid}")
+}
+
 impl Watch {
     /// Examines a step.
     pub(crate) fn see(&mut self, step: &Watched) {
@@ -183,15 +193,16 @@ impl Watch {
         let (krylov, usual) = (cost.krylov as f64, self.usual_krylov);
         if self.seen >= USUAL_AFTER && krylov > KRYLOV_GROWTH * usual && krylov > FEW_KRYLOV_ITERATIONS {
             let text = format!(
-                "the linear solver took {krylov} iterations in a step; {usual:.0} had been usual: cut cells are cured by \
-                 aggregation = true, long steps and fine grids by solver.krylov.preconditioner = \"multigrid\""
+                "the linear solver took {krylov} iterations in a step; {usual:.0} had been usual: {}shorten time.step",
+                solver_advice(step.settings)
             );
             self.warn(step, Kind::KrylovClimbs, text);
         }
         if limited > 0 {
             let text = format!(
                 "{limited} linear systems of a step were left unsolved after the {max_krylov_iterations} iterations allowed: they are badly \
-                 conditioned; raise solver.krylov.max_iterations, shorten time.step, or set aggregation = true for cut cells"
+                 conditioned; {}shorten time.step, or raise solver.krylov.max_iterations",
+                solver_advice(step.settings)
             );
             self.warn(step, Kind::KrylovLimited, text);
         }

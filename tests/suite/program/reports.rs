@@ -175,6 +175,14 @@ fn a_run_says_what_solves_its_systems_and_warns_of_those_left_unsolved() -> Resu
     assert_eq!(code, Some(0), "{told}");
     assert!(text.contains("of conjugate gradients a step"), "{text}");
     assert_eq!(told.matches("left unsolved after the 2 iterations allowed").count(), 1, "{told}");
+    // What is set already is no advice.
+    let [aggregation, multigrid] = ["aggregation = true", "preconditioner = \"multigrid\""];
+    assert!(told.contains(aggregation) && told.contains(multigrid), "{told}");
+    let set = ["aggregation=true", "solver.krylov.preconditioner=\"multigrid\"", "solver.krylov.max_iterations=1"];
+    let other = tempfile::tempdir()?;
+    let settings: Vec<&str> = set.iter().flat_map(|set| ["--set", set]).chain(["--steps", "1"]).collect();
+    let (_, _, told) = run(&scene("compaction.json"), other.path(), &settings)?;
+    assert!(told.contains("left unsolved") && !told.contains(aggregation) && !told.contains(multigrid), "{told}");
     let report = report(directory.path())?;
     assert_eq!(report["counts"]["krylov_limited"], report["counts"]["newton_iterations"]);
     let krylov = serde_json::json!({ "method": "conjugate gradients", "why": "the tangent is symmetric" });
