@@ -165,7 +165,7 @@ impl Cells {
         ranges.map(|range| &self.members[range]).zip(self.volumes.iter().copied())
     }
 
-    /// The sum over the members of every cell, of numbers stored by group and lane.
+    /// For every cell, the sum of the numbers of its members. `of_slots` has the numbers by group and lane.
     pub fn sums(&self, of_slots: &[[f64; LANES]]) -> Vec<f64> {
         let number = |slot: usize| of_slots[slot / LANES][slot % LANES];
         self.iter().map(|(members, _)| members.iter().map(|member| number(member.slot as usize)).sum()).collect()

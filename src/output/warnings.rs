@@ -119,7 +119,7 @@ pub(crate) struct Watched<'a> {
     pub stagnated: usize,
 }
 
-/// What makes linear systems easier to solve, and is not set yet; each entry with a comma.
+/// The settings that make linear systems easier to solve and are not set yet. A comma follows each of them.
 fn solver_advice(settings: &Settings) -> String {
     let aggregation = if settings.aggregation { "" } else { "set aggregation = true for cut cells, " };
     let multigrid = match settings.preconditioner {

@@ -175,7 +175,7 @@ fn a_run_says_what_solves_its_systems_and_warns_of_those_left_unsolved() -> Resu
     assert_eq!(code, Some(0), "{told}");
     assert!(text.contains("of conjugate gradients a step"), "{text}");
     assert_eq!(told.matches("left unsolved after the 2 iterations allowed").count(), 1, "{told}");
-    // What is set already is no advice.
+    // The warning advises no setting that is set already.
     let [aggregation, multigrid] = ["aggregation = true", "preconditioner = \"multigrid\""];
     assert!(told.contains(aggregation) && told.contains(multigrid), "{told}");
     let set = ["aggregation=true", "solver.krylov.preconditioner=\"multigrid\"", "solver.krylov.max_iterations=1"];

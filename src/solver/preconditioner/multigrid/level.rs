@@ -18,7 +18,7 @@ const MIDDLE: usize = 13;
 /// Rows in one part of the work of a thread.
 const ROWS: usize = 512;
 /// Cells whose matrices are in memory at once.
-const CELLS: usize = 512;
+const CELLS: usize = 64;
 /// The number of a neighbour that does not exist.
 const NONE: u32 = u32::MAX;
 
