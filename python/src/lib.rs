@@ -1,4 +1,4 @@
-//! bfree from Python: scenes, simulations, what a step solves, laws by their energy, and the check of tangents.
+//! bfree from Python: scenes, simulations, what a step solves, and laws by their energy.
 //! `package/bfree/__init__.pyi` is its manual for Python.
 
 mod arrays;
@@ -9,7 +9,6 @@ mod scene;
 mod simulation;
 mod step;
 mod system;
-mod tangent;
 
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
@@ -57,19 +56,6 @@ mod module {
     use super::step::Step;
     #[pymodule_export]
     use super::system::Tangent;
-    #[pymodule_export]
-    use super::tangent::convention::Convention;
-    #[pymodule_export]
-    use super::tangent::law::{LawStep, check_python_law};
-    #[cfg(unix)]
-    #[pymodule_export]
-    use super::tangent::library::{check_law_in_library, serve_law};
-    #[pymodule_export]
-    use super::tangent::newton::{NewtonOrder, newton_order, newton_rows};
-    #[pymodule_export]
-    use super::tangent::report::{Diagnosis, Entry, Finding, Report};
-    #[pymodule_export]
-    use super::tangent::residual::check_residual;
     #[pymodule_export]
     use super::{SceneError, StepError};
     use pyo3::prelude::*;

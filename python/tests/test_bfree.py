@@ -3,7 +3,9 @@
 import ast
 import collections
 import json
+import shutil
 import signal
+import subprocess
 import threading
 import time
 from pathlib import Path
@@ -306,3 +308,24 @@ def test_the_stubs_are_those_of_the_module():
         there = {one for one in vars(getattr(bfree, name)) if not one.startswith("__") or one in ("__iter__", "__next__")}
         if name not in ("Number", "Tangent"):
             assert members == there, name
+
+
+def test_a_scene_loads_only_libraries_that_are_allowed(tmp_path):
+    if not shutil.which("gfortran"):
+        pytest.skip("there is no gfortran")
+    library = tmp_path / "libneo.so"
+    source = ROOT / "examples" / "laws" / "neo_hookean.f"
+    subprocess.run(["gfortran", "-shared", "-fPIC", "-O2", "-I", source.parent, "-o", library, source], check=True)
+    law = {"umat": {"library": str(library), "properties": [100.0, 60.0]}}
+    scene = {
+        "grid": {"size": [3, 2], "spacing": 0.25},
+        "time": {"step": 1, "end": 1, "scheme": "none"},
+        "bodies": [{"name": "block", "shape": {"box": {"min": [0, 0], "max": [1, 1]}}, "density": 1, "material": law}],
+        "boundary": {"bottom": "fixed"},
+        "gravity": {"acceleration": [0, -10]},
+    }
+    with pytest.raises(bfree.SceneError, match="allow_libraries"):
+        bfree.Scene(scene)
+    step = bfree.Scene(scene, allow_libraries=[library]).build().advance()
+    assert step.reactions["bottom"] == pytest.approx([0, 10], abs=1e-6)
+    assert step.residuals[-1] < 1e-8 * step.residuals[0]

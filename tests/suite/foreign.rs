@@ -31,7 +31,7 @@ impl Library {
         let mut command = Command::new(compiler);
         command.args(["-O2", "-shared", "-fPIC", "-o"]).arg(&path).arg(source).current_dir(root.join("examples/laws"));
         if compiler == "gcc" {
-            command.arg("-I").arg(root.join("verification/tangent-check/include"));
+            command.arg("-I").arg(root.join("tangent-check/include"));
         }
         let Ok(status) = command.status() else {
             eprintln!("*** NOT TESTED: {source}, because there is no {compiler} ***");

@@ -1,15 +1,22 @@
-"""Implicit finite-strain material point method, and a check of tangents for any law and any code. `help(…)` of a name explains it."""
+"""Implicit finite-strain material point method. `help(…)` of a name explains it."""
+
+import os
+import sys
+
+# Laws from libraries find the utility routines of Abaqus in the extension, if its symbols are global.
+if hasattr(os, "RTLD_GLOBAL"):
+    _flags = sys.getdlopenflags()
+    sys.setdlopenflags(_flags | os.RTLD_GLOBAL)
+try:
+    from . import _bfree
+finally:
+    if hasattr(os, "RTLD_GLOBAL"):
+        sys.setdlopenflags(_flags)
 
 from ._bfree import (
-    Diagnosis,
-    Entry,
-    Finding,
     Law,
-    LawStep,
-    NewtonOrder,
     Number,
     Particles,
-    Report,
     Scene,
     SceneError,
     Simulation,
@@ -18,20 +25,12 @@ from ._bfree import (
     Tangent,
     __version__,
     det,
-    newton_order,
 )
-from .tangents import check_law, check_law_library, check_tangent, newton_table
 
 __all__ = [
-    "Diagnosis",
-    "Entry",
-    "Finding",
     "Law",
-    "LawStep",
-    "NewtonOrder",
     "Number",
     "Particles",
-    "Report",
     "Scene",
     "SceneError",
     "Simulation",
@@ -39,10 +38,5 @@ __all__ = [
     "StepError",
     "Tangent",
     "__version__",
-    "check_law",
-    "check_law_library",
-    "check_tangent",
     "det",
-    "newton_order",
-    "newton_table",
 ]

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use tangent_check::convention::Measure;
 use tangent_check::law::CallFailed;
-use tangent_check::library::{Description, Kind};
+use tangent_check::library::{Description, Kind, StressState};
 
 /// Libraries that scenes may load.
 static ALLOWED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
@@ -139,6 +139,10 @@ pub struct CLawParameters {
     pub symmetric: bool,
 }
 
+fn stress_state(plane_strain: bool) -> StressState {
+    if plane_strain { StressState::PlaneStrain } else { StressState::Solid }
+}
+
 /// The keys of a law from a library.
 pub(crate) trait Outside {
     /// The library and how to call it, with the path as the scene gives it.
@@ -191,7 +195,7 @@ impl Outside for UmatParameters {
             },
             properties: self.properties.clone(),
             state: self.state.names.iter().cloned().zip(at_rest.iter().copied()).collect(),
-            plane_strain: self.plane_strain,
+            stress_state: stress_state(self.plane_strain),
         }
     }
 
@@ -216,7 +220,7 @@ impl Outside for MfrontParameters {
             kind: Kind::Mfront { name: self.behaviour.clone(), external },
             properties: self.properties.clone(),
             state: Vec::new(),
-            plane_strain: self.plane_strain,
+            stress_state: stress_state(self.plane_strain),
         }
     }
 
@@ -232,7 +236,7 @@ impl Outside for CLawParameters {
             kind: Kind::C { name: self.law.clone() },
             properties: self.properties.clone(),
             state: Vec::new(),
-            plane_strain: false,
+            stress_state: StressState::Solid,
         }
     }
 

@@ -1,0 +1,26 @@
+"""The notebooks run, and the facts that they assert hold."""
+
+from pathlib import Path
+
+import pytest
+
+nbclient = pytest.importorskip("nbclient")
+nbformat = pytest.importorskip("nbformat")
+EXAMPLES = sorted((Path(__file__).resolve().parents[1] / "examples").glob("*.ipynb"))
+
+
+# The other packages that a notebook needs; without them it is skipped, and pytest says so.
+NEEDED = {"check_felupe": ["felupe"], "check_jax": ["jax"], "check_scikit_fem": ["skfem"]}
+
+
+def test_there_are_four():
+    assert len(EXAMPLES) == 4
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_notebook(path):
+    for package in NEEDED.get(path.stem, []):
+        pytest.importorskip(package)
+    notebook = nbformat.read(path, as_version=4)
+    assert all(not cell.get("outputs") for cell in notebook.cells), "without outputs its changes can be read"
+    nbclient.NotebookClient(notebook, timeout=300).execute()

@@ -1,0 +1,191 @@
+//! Terms with one coefficient: what is missing in a tangent, or too much.
+
+use super::mistakes::{mapped, spatial_form};
+use super::observation::{AGREEMENT, Observation, VISIBLE, distance, spatial};
+use crate::convention::{Components, Configuration, Convention, Measure, Tensor, convert};
+use crate::finding::Diagnosis;
+use crate::matrix::Matrix;
+use crate::tensor::{IDENTITY, ZERO, determinant};
+
+/// A term that a tangent may lack.
+#[derive(Clone, Copy, PartialEq)]
+enum Term {
+    /// I ⊗ I.
+    Volume,
+    /// The fourth-order identity of symmetric tensors.
+    Identity,
+    /// The identity less ⅓ I ⊗ I.
+    Deviator,
+    /// σ ⊗ I.
+    StressVolume,
+    /// I ⊗ σ.
+    VolumeStress,
+    /// The geometric part; for the Jaumann rates H:D = D σ + σ D.
+    Geometric,
+    /// The right tangent itself.
+    Whole,
+    /// I ⊗ I of material axes, for ∂S/∂E.
+    MaterialVolume,
+    /// The identity of material axes, for ∂S/∂E.
+    MaterialIdentity,
+}
+
+const TERMS: [(Term, &str); 9] = [
+    (Term::Whole, "the right tangent"),
+    (Term::Volume, "I ⊗ I"),
+    (Term::StressVolume, "σ ⊗ I"),
+    (Term::VolumeStress, "I ⊗ σ"),
+    (Term::Geometric, "H (H:D = D σ + σ D, the geometric part)"),
+    (Term::Identity, "the symmetric identity"),
+    (Term::Deviator, "the deviatoric identity"),
+    (Term::MaterialVolume, "I ⊗ I in material axes"),
+    (Term::MaterialIdentity, "the symmetric identity in material axes"),
+];
+
+/// The powers of J with which a term may come.
+const POWERS: [(i32, &str); 3] = [(0, ""), (-1, "/J"), (1, " J")];
+
+impl Term {
+    /// The term in the components of the convention.
+    fn tangent(self, convention: &Convention, observation: &Observation) -> Option<Matrix> {
+        let at = &observation.at;
+        let without_stress = Configuration { stress: ZERO, ..at.clone() };
+        let truesdell = spatial_form(Measure::Truesdell);
+        let spatial = |matrix: Matrix| convert(&matrix, &truesdell, convention, &without_stress).ok();
+        let material = convention.measure == Measure::SecondPiolaByGreen;
+        match self {
+            Term::Whole => Some(observation.measured.tangent.clone()),
+            Term::Volume => spatial(dyad(&truesdell, &IDENTITY, &IDENTITY)),
+            Term::StressVolume => spatial(dyad(&truesdell, &at.stress, &IDENTITY)),
+            Term::VolumeStress => spatial(dyad(&truesdell, &IDENTITY, &at.stress)),
+            Term::Identity => spatial(identity(&truesdell)),
+            Term::Deviator => {
+                let volume = dyad(&truesdell, &IDENTITY, &IDENTITY);
+                let identity = identity(&truesdell);
+                spatial(mapped(&identity, |i, j| identity[(i, j)] - volume[(i, j)] / 3.0))
+            }
+            Term::Geometric => self.geometric(convention, at),
+            Term::MaterialVolume => material.then(|| dyad(convention, &IDENTITY, &IDENTITY)),
+            Term::MaterialIdentity => material.then(|| identity(convention)),
+        }
+    }
+
+    /// H for a spatial measure; dF S, or what corresponds to it, for others.
+    fn geometric(self, convention: &Convention, at: &Configuration) -> Option<Matrix> {
+        let none = Matrix::zeros(6, 6);
+        let part = |measure| {
+            convert(&none, &spatial_form(Measure::Truesdell), &Convention { measure, ..convention.clone() }, at)
+        };
+        if !spatial(convention.measure) {
+            return part(convention.measure).ok();
+        }
+        part(Measure::JaumannKirchhoff).ok()
+    }
+}
+
+/// a ⊗ b.
+fn dyad(convention: &Convention, a: &Tensor, b: &Tensor) -> Matrix {
+    let rows = convention.stress.vector(a);
+    let columns = derivative(&convention.strain, b);
+    mapped(&Matrix::zeros(rows.len(), columns.len()), |row, column| rows[row] * columns[column])
+}
+
+/// ∂(b : ε)/∂ε_k for each component of the strain.
+fn derivative(strain: &Components, b: &Tensor) -> Vec<f64> {
+    let entry = |k: usize| {
+        let (i, j) = strain.pairs[k];
+        if i == j { b[i][i] } else { (b[i][j] + b[j][i]) / strain.shear }
+    };
+    (0..strain.count()).map(entry).collect()
+}
+
+/// The identity of symmetric tensors.
+fn identity(convention: &Convention) -> Matrix {
+    let mut matrix = Matrix::zeros(convention.stress.count(), convention.strain.count());
+    for column in 0..matrix.columns {
+        let unit = crate::convention::unit_strain(convention, column);
+        for (row, value) in convention.stress.vector(&unit).into_iter().enumerate() {
+            matrix[(row, column)] = value;
+        }
+    }
+    matrix
+}
+
+/// The term and its coefficient that explain all deviations; `None` if no single term does.
+pub(super) fn fit(convention: &Convention, observations: &[Observation]) -> Option<Diagnosis> {
+    let mut sentences = Vec::new();
+    let mut first = None;
+    for (term, name) in TERMS {
+        for (power, suffix) in POWERS {
+            if let Some(coefficient) = coefficient(term, power, convention, observations) {
+                sentences.push(sentence(term, name, suffix, coefficient));
+                first = first.or(Some(coefficient));
+            }
+        }
+    }
+    let coefficient = first?;
+    let [one] = sentences.as_slice() else {
+        let tell = vec!["large strain and stress, J ≠ 1".to_string()];
+        let sentence = format!("Several terms explain your tangent equally well: {}", sentences.join(" Or: "));
+        return Some(Diagnosis {
+            sentence,
+            candidates: sentences,
+            states_that_tell: tell,
+            coefficient: Some(coefficient),
+            share: 1.0,
+        });
+    };
+    let [sentence, candidates] = [one.clone(), one.clone()];
+    Some(Diagnosis {
+        sentence,
+        candidates: vec![candidates],
+        states_that_tell: Vec::new(),
+        coefficient: Some(coefficient),
+        share: 1.0,
+    })
+}
+
+fn sentence(term: Term, name: &str, suffix: &str, coefficient: f64) -> String {
+    match term {
+        Term::Whole if suffix.is_empty() => {
+            format!("Your tangent is the right one times {:.6}.", 1.0 + coefficient)
+        }
+        _ => {
+            let sign = if coefficient < 0.0 { "less" } else { "and" };
+            format!("Your tangent is the right one {sign} the term {:.6}{suffix} times {name}.", coefficient.abs())
+        }
+    }
+}
+
+/// The coefficient α for which claimed = right + α Jⁿ T in every state, by least squares weighted with the errors.
+/// A fit to fewer than two states that show a deviation would prove nothing.
+fn coefficient(term: Term, power: i32, convention: &Convention, observations: &[Observation]) -> Option<f64> {
+    let mut parts = Vec::new();
+    let [mut numerator, mut denominator] = [0.0, 0.0];
+    for observation in observations {
+        let factor = determinant(&observation.at.gradient).powi(power);
+        let tangent = term.tangent(convention, observation)?;
+        let tangent = mapped(&tangent, |row, column| factor * tangent[(row, column)]);
+        let error = observation.measured.error();
+        for (k, entry) in tangent.entries.iter().enumerate() {
+            let deviation = observation.claimed.entries[k] - observation.measured.tangent.entries[k];
+            numerator += deviation * entry / (error * error);
+            denominator += entry * entry / (error * error);
+        }
+        parts.push((tangent, error));
+    }
+    let coefficient = numerator / denominator;
+    if !coefficient.is_finite() {
+        return None;
+    }
+    let mut told = 0;
+    for ((part, error), observation) in parts.iter().zip(observations) {
+        let right = &observation.measured.tangent;
+        let wrong = mapped(part, |row, column| right[(row, column)] + coefficient * part[(row, column)]);
+        if distance(&wrong, &observation.claimed) > AGREEMENT * error {
+            return None;
+        }
+        told += usize::from(distance(right, &observation.claimed) > VISIBLE * error);
+    }
+    (told >= 2).then_some(coefficient)
+}

@@ -1,0 +1,297 @@
+//! The answers of right laws are those of their formulas, and their tangents those of differences.
+
+use std::io::Write;
+use std::path::Path;
+use std::process::Command;
+
+use crate::compiled::{c_law, host, mfront, stress_state, umat};
+use crate::steps::{assert_close, double_dot, general_step, green_lagrange, hooke, tensor, vector};
+use crate::{LAMBDA, MU};
+use tangent_check::convention::{Components, Measure, Tensor};
+use tangent_check::law::{Law, Response, Step};
+use tangent_check::library::child::{Child, LIMIT};
+use tangent_check::library::{Caller, Description, Kind, LibraryLaw, Signature, StressState, c, empty_response, open};
+use tangent_check::matrix::Matrix;
+use tangent_check::tensor::{IDENTITY, ZERO, determinant, inverse, product, sum, trace, transposed};
+
+/// The step with its last increment changed by `change` in a direction of the convention.
+fn perturbed(step: &Step, measure: Measure, direction: &Tensor, change: f64) -> Step {
+    let mut step = step.clone();
+    match measure {
+        Measure::PiolaByGradient => step.gradient = sum(&step.gradient, change, direction),
+        Measure::CauchyByStrain => step.strain_increment = sum(&step.strain_increment, change, direction),
+        _ => {
+            // exp(change · direction), up to an error of the fourth power of the change.
+            let [first, second] = [sum(&IDENTITY, change, direction), product(direction, direction)];
+            let third = product(&second, direction);
+            let exponential = sum(&sum(&first, change.powi(2) / 2.0, &second), change.powi(3) / 6.0, &third);
+            step.gradient = product(&exponential, &step.gradient);
+        }
+    }
+    step
+}
+
+/// The tangent by central differences of two steps, extrapolated.
+fn measured(caller: &mut dyn Caller, step: &Step) -> Matrix {
+    let convention = caller.signature().convention.clone();
+    let (stress, strain) = (&convention.stress, &convention.strain);
+    let full = convention.measure == Measure::PiolaByGradient;
+    let kirchhoff = convention.measure == Measure::JaumannKirchhoff;
+    let mut response = empty_response();
+    let mut tangent = Matrix::zeros(stress.pairs.len(), strain.pairs.len());
+    for (column, &(k, l)) in strain.pairs.iter().enumerate() {
+        let mut direction = ZERO;
+        direction[k][l] = if k == l { 1.0 } else { 1.0 / strain.shear };
+        if !full {
+            direction[l][k] = direction[k][l];
+        }
+        let mut at = |change: f64| {
+            let step = perturbed(step, convention.measure, &direction, change);
+            caller.call(&step, &mut response).unwrap();
+            let factor = if kirchhoff { determinant(&step.gradient) } else { 1.0 };
+            response.stress.iter().map(|stress| factor * stress).collect::<Vec<_>>()
+        };
+        // Strain increments are a thousand times smaller than the entries of F.
+        let h = if convention.measure == Measure::CauchyByStrain { 1e-6 } else { 1e-3 };
+        let values = [h, -h, h / 2.0, -h / 2.0].map(&mut at);
+        for row in 0..stress.pairs.len() {
+            let coarse = (values[0][row] - values[1][row]) / (2.0 * h);
+            let fine = (values[2][row] - values[3][row]) / h;
+            let factor = if kirchhoff { determinant(&step.gradient) } else { 1.0 };
+            tangent[(row, column)] = (4.0 * fine - coarse) / 3.0 / factor;
+        }
+    }
+    tangent
+}
+
+/// The response in this program and in the child, which must be the same to the last bit; and the tangent against differences.
+fn checked(description: &Description, step: &dyn Fn(&Signature) -> Step) -> Response {
+    let mut inside = open(description).unwrap();
+    let mut outside = Child::start(host(), description.clone(), LIMIT).unwrap();
+    assert_eq!(inside.signature(), outside.signature());
+    let step = step(inside.signature());
+    let [mut response, mut other] = [empty_response(), empty_response()];
+    inside.call(&step, &mut response).unwrap();
+    outside.call(&step, &mut other).unwrap();
+    assert_eq!(response, other);
+    let tangent = measured(&mut outside, &step);
+    assert_close(&response.tangent.entries, &tangent.entries, 1e-9, &inside.signature().name);
+    response
+}
+
+/// P = μ (F − F⁻ᵀ) + λ ln J F⁻ᵀ
+fn neo_hookean(f: &Tensor) -> Tensor {
+    let cofactor = transposed(&inverse(f).unwrap());
+    sum(&sum(&sum(&ZERO, MU, f), -MU, &cofactor), LAMBDA * determinant(f).ln(), &cofactor)
+}
+
+/// A UMAT of the total F in 3D and plane strain: σ = P Fᵀ / J.
+#[test]
+fn neo_hookean_umat() {
+    for plane in [false, true] {
+        let Some(mut description) = umat("neo_hookean.f", Measure::JaumannKirchhoff, &[LAMBDA, MU], 0) else { return };
+        description.stress_state = stress_state(plane);
+        let response = checked(&description, &|signature| general_step(signature, plane));
+        let f = general_step(open(&description).unwrap().signature(), plane).gradient;
+        let kirchhoff = product(&neo_hookean(&f), &transposed(&f));
+        let cauchy = sum(&ZERO, 1.0 / determinant(&f), &kirchhoff);
+        assert_close(
+            &response.stress,
+            &vector(&cauchy, &tangent_check::library::umat::components(stress_state(plane), 1.0)),
+            1e-12,
+            "σ",
+        );
+    }
+}
+
+/// Radial return with tensors; the plastic multiplier by bisection.
+fn radial_return(properties: &[f64; 6], stress: &Tensor, a: f64, strain_increment: &Tensor) -> (Tensor, f64) {
+    let [e, ν, σ_0, h, q, δ] = *properties;
+    let [λ, g] = [e * ν / ((1.0 + ν) * (1.0 - 2.0 * ν)), e / (2.0 * (1.0 + ν))];
+    let trial = sum(stress, 1.0, &hooke(λ, g, strain_increment));
+    let deviator = sum(&trial, -trace(&trial) / 3.0, &IDENTITY);
+    let mises = (1.5 * double_dot(&deviator, &deviator)).sqrt();
+    let excess = |step: f64| mises - 3.0 * g * step - (σ_0 + h * (a + step) + q * (1.0 - (-δ * (a + step)).exp()));
+    if excess(0.0) <= 0.0 {
+        return (trial, a);
+    }
+    let [mut low, mut high] = [0.0, mises / (3.0 * g)];
+    for _ in 0..200 {
+        let middle = (low + high) / 2.0;
+        *if excess(middle) > 0.0 { &mut low } else { &mut high } = middle;
+    }
+    (sum(&trial, -3.0 * g * low / mises, &deviator), a + low)
+}
+
+/// A UMAT of the strain increment, elastic and plastic, with a stress at the start that DROT turns.
+#[test]
+fn j2_umat() {
+    let properties = [210e3, 0.3, 400.0, 1e3, 150.0, 20.0];
+    for (plane, scale) in [(false, 1.0), (true, 1.0), (false, 1e-2)] {
+        let Some(mut description) = umat("j2.f90", Measure::CauchyByStrain, &properties, 1) else { return };
+        description.stress_state = stress_state(plane);
+        let components = tangent_check::library::umat::components(stress_state(plane), 1.0);
+        let make = |signature: &Signature| {
+            let mut step = general_step(signature, plane);
+            step.strain_increment = sum(&ZERO, scale, &step.strain_increment);
+            step.stress = vec![120.0, -80.0, 30.0, 50.0, -20.0, 10.0][..components.pairs.len()].to_vec();
+            step.state = vec![0.01];
+            step
+        };
+        let response = checked(&description, &make);
+        let step = make(open(&description).unwrap().signature());
+        let before = tensor(&step.stress, &components);
+        let before = product(&product(&step.rotation, &before), &transposed(&step.rotation));
+        let (stress, a) = radial_return(&properties, &before, 0.01, &step.strain_increment);
+        assert_eq!(a > 0.01, scale == 1.0, "the step is plastic or elastic as planned");
+        assert_close(&response.stress, &vector(&stress, &components), 1e-12, "σ");
+        assert_close(&response.state, &[a], 1e-12, "equivalent plastic strain");
+    }
+}
+
+/// A law in C with memory over two steps: S = 𝕃 : E + Q, Q = a Qₙ + g b 𝕃 : (E − Eₙ).
+#[test]
+fn viscoelastic_c() {
+    let [g, τ] = [0.4, 0.7];
+    let Some(description) = c_law("viscoelastic.c", "viscoelastic", &[LAMBDA, MU, g, τ]) else { return };
+    let state_before: Vec<f64> = [0.1, -0.2, 0.3, 0.05, -0.1, 0.2].into();
+    let make = |signature: &Signature| Step { state: state_before.clone(), ..general_step(signature, false) };
+    let response = checked(&description, &make);
+    let caller = open(&description).unwrap();
+    assert_eq!(caller.signature().properties, ["lambda", "mu", "g", "tau"]);
+    assert_eq!(caller.signature().state[3], "Q12");
+    let step = make(caller.signature());
+    let [e_n, e] = [green_lagrange(&step.gradient_before), green_lagrange(&step.gradient)];
+    let decay = (-step.length / τ).exp();
+    let branch = g * (1.0 - decay) * τ / step.length;
+    let components = tangent_check::library::umat::components(StressState::Solid, 1.0);
+    let before = sum(&ZERO, decay, &tensor(&state_before, &components));
+    let q = sum(&before, branch, &hooke(LAMBDA, MU, &sum(&e, -1.0, &e_n)));
+    let p = product(&step.gradient, &sum(&hooke(LAMBDA, MU, &e), 1.0, &q));
+    assert_close(&response.stress, p.as_flattened(), 1e-12, "P");
+    assert_close(&response.state, &vector(&q, &components), 1e-12, "Q");
+}
+
+/// A law in Fortran through the C header; and the energy, whose derivative is P.
+#[test]
+fn saint_venant_fortran() {
+    let Some(description) = c_law("saint_venant.f90", "saint_venant", &[LAMBDA, MU]) else { return };
+    let response = checked(&description, &|signature| general_step(signature, false));
+    let mut law = c::CLaw::open(&description).unwrap();
+    let step = general_step(law.signature(), false);
+    let e = green_lagrange(&step.gradient);
+    let p = product(&step.gradient, &hooke(LAMBDA, MU, &e));
+    assert_close(&response.stress, p.as_flattened(), 1e-12, "P");
+    assert_eq!(law.energy(), None);
+    law.call(&step, &mut empty_response()).unwrap();
+    let energy = law.energy().unwrap();
+    assert_close(&[energy], &[double_dot(&e, &hooke(LAMBDA, MU, &e)) / 2.0], 1e-12, "energy");
+}
+
+/// A finite strain behaviour with MFront's interface, loading and unloading.
+#[test]
+fn mfront_finite_strain() {
+    let softening = 0.6;
+    for (plane, greatest) in [(false, 0.0), (false, 2.0), (true, 0.0), (true, 2.0)] {
+        let Some(mut description) = mfront("SofteningNeoHooke", &[LAMBDA, MU, softening]) else { return };
+        description.stress_state = stress_state(plane);
+        description.state = vec![("GreatestEnergy".into(), greatest)];
+        let response = checked(&description, &|signature| general_step(signature, plane));
+        let caller = open(&description).unwrap();
+        assert_eq!(caller.signature().properties[2], "Softening");
+        let f = general_step(caller.signature(), plane).gradient;
+        let ln_j = determinant(&f).ln();
+        let w = MU / 2.0 * (double_dot(&f, &f) - 3.0 - 2.0 * ln_j) + LAMBDA / 2.0 * ln_j * ln_j;
+        let η = if w < greatest { 1.0 - softening * (1.0 - w / greatest) } else { 1.0 };
+        let p = sum(&ZERO, η, &neo_hookean(&f));
+        let components = caller.signature().convention.stress.clone();
+        assert_eq!(components.pairs.len(), if plane { 5 } else { 9 });
+        assert_close(&response.stress, &vector(&p, &components), 1e-12, "P");
+        assert_close(&response.state, &[w.max(greatest)], 1e-12, "greatest energy");
+    }
+}
+
+/// A small strain behaviour with MFront's interface: √2, the elastic properties in front, and a tensor that turns with the material.
+#[test]
+fn mfront_small_strain() {
+    let [e, ν] = [70e3, 0.25];
+    for plane in [false, true] {
+        let Some(mut description) = mfront("Elasticity", &[e, ν]) else { return };
+        description.stress_state = stress_state(plane);
+        let before = [1e-3, 2e-3, -1e-3, 3e-3, -2e-3, 1e-3];
+        let make = |signature: &Signature| {
+            let mut step = general_step(signature, plane);
+            step.state = before[..step.state.len()].to_vec();
+            step
+        };
+        let response = checked(&description, &make);
+        let caller = open(&description).unwrap();
+        let signature = caller.signature();
+        assert_eq!(signature.properties, ["YoungModulus", "PoissonRatio"]);
+        assert_eq!(signature.state[3], "ElasticStrain12");
+        let step = make(signature);
+        let components =
+            Components { shear: 2f64.sqrt(), ..tangent_check::library::umat::components(stress_state(plane), 1.0) };
+        assert_eq!([&signature.convention.stress, &signature.convention.strain], [&components; 2]);
+        let turned = product(&product(&step.rotation, &tensor(&step.state, &components)), &transposed(&step.rotation));
+        let strain = sum(&turned, 1.0, &step.strain_increment);
+        let stress = hooke(e * ν / ((1.0 + ν) * (1.0 - 2.0 * ν)), e / (2.0 * (1.0 + ν)), &strain);
+        assert_close(&response.stress, &vector(&stress, &components), 1e-12, "σ");
+        assert_close(&response.state, &vector(&strain, &components), 1e-12, "elastic strain");
+    }
+}
+
+/// A UMAT that writes what it was given into STATEV, in the order of [`every_argument`].
+const PROBE: &str = "
+subroutine umat(stress, statev, ddsdde, sse, spd, scd, rpl, ddsddt, drplde, drpldt, stran, dstran, time, dtime, &
+    temp, dtemp, predef, dpred, cmname, ndi, nshr, ntens, nstatv, props, nprops, coords, drot, pnewdt, celent, &
+    dfgrd0, dfgrd1, noel, npt, layer, kspt, jstep, kinc)
+  implicit none
+  integer :: ndi, nshr, ntens, nstatv, nprops, noel, npt, layer, kspt, jstep(4), kinc
+  double precision :: stress(ntens), statev(nstatv), ddsdde(ntens, ntens), sse, spd, scd, rpl, ddsddt(ntens)
+  double precision :: drplde(ntens), drpldt, stran(ntens), dstran(ntens), time(2), dtime, temp, dtemp, predef(1)
+  double precision :: dpred(1), props(nprops), coords(3), drot(3, 3), pnewdt, celent, dfgrd0(3, 3), dfgrd1(3, 3)
+  character(len=*) :: cmname
+  statev = [stress, stran, dstran, time, dtime, temp, dtemp, transpose(drot), transpose(dfgrd0), transpose(dfgrd1), &
+    props, dble([ndi, nshr, ntens, nstatv, nprops, noel, npt, layer, kspt, jstep, kinc, len(cmname), &
+    len_trim(cmname), ichar(cmname(1:1)), ichar(cmname(5:5))]), sum(abs(ddsdde)) + sse + spd + scd + rpl + drpldt &
+    + sum(abs(ddsddt)) + sum(abs(drplde)) + sum(abs(coords)) + predef + dpred, celent]
+  if (pnewdt < 1e10) statev = -1
+end subroutine umat
+";
+
+/// Each argument of a UMAT arrives: its value, its order of components, the length of CMNAME.
+#[test]
+fn every_argument() {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
+    let [source, library] = ["probe.f90", "libprobe.so"].map(|name| folder.join(name));
+    std::fs::write(&source, PROBE).unwrap();
+    let mut compiler = Command::new("gfortran");
+    let Ok(status) = compiler.args(["-shared", "-fPIC", "-o"]).arg(&library).arg(&source).status() else {
+        std::io::stderr().write_all(b"\n*** NOT TESTED: every_argument, there is no gfortran ***\n").unwrap();
+        return;
+    };
+    assert!(status.success());
+    let state = tangent_check::library::umat::state(72);
+    let kind = Kind::Umat { material: "STEEL".into(), tangent: Measure::JaumannKirchhoff, temperature: 20.0 };
+    let description =
+        Description { library, kind, properties: vec![7.0, 8.0], state, stress_state: StressState::Solid };
+    let mut law = LibraryLaw::new(Box::new(Child::start(host(), description, LIMIT).unwrap()));
+    let mut step = general_step(law.signature(), false);
+    step.stress = vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
+    let [stress, engineering] =
+        [1.0, 2.0].map(|shear| tangent_check::library::umat::components(StressState::Solid, shear));
+    let turned = product(&product(&step.rotation, &tensor(&step.stress, &stress)), &transposed(&step.rotation));
+    let wanted = [
+        &vector(&turned, &stress)[..],
+        &vector(&step.strain, &engineering),
+        &vector(&step.strain_increment, &engineering),
+        &[0.25, 0.25, 0.5, 20.0, 0.0],
+        step.rotation.as_flattened(),
+        step.gradient_before.as_flattened(),
+        step.gradient.as_flattened(),
+        &[7.0, 8.0, 3.0, 3.0, 6.0, 72.0, 2.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 3.0],
+        &[80.0, 5.0, f64::from(b'S'), f64::from(b'L'), 0.0, 1.0],
+    ];
+    assert_close(&law.respond(&step).unwrap().state, &wanted.concat(), 1e-15, "arguments");
+}

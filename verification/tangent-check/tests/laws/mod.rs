@@ -1,8 +1,0 @@
-//! Laws for the tests, over dual numbers, so that their tangents are exact to round-off.
-#![allow(dead_code, missing_docs)]
-
-pub mod central;
-pub mod dual;
-pub mod exact;
-pub mod planted;
-pub mod shipped;
