@@ -199,6 +199,29 @@ impl<const D: usize> Particles<D> {
         self.body.push(body);
     }
 
+    /// Adds a particle without volume that has the state of the particle at the place `p`. Returns its place.
+    pub(crate) fn push_copy(&mut self, p: usize) -> usize {
+        let new = self.len();
+        self.push_without_inertia(self.position[p], 0.0, 0.0, self.body[p]);
+        self.displacement_gradient[new] = self.displacement_gradient[p];
+        for vectors in [&mut self.velocity, &mut self.acceleration] {
+            vectors.extend(vectors.get(p).copied());
+        }
+        self.dilatation.extend(self.dilatation.get(p).copied());
+        self.memory.extend_from_within(p * self.remembered..(p + 1) * self.remembered);
+        new
+    }
+
+    /// Keeps the particles at the first `count` places.
+    pub(crate) fn truncate(&mut self, count: usize) {
+        let Self { position, velocity, acceleration, displacement_gradient, volume, mass, body, id, memory, .. } = self;
+        [position, velocity, acceleration].into_iter().for_each(|vectors| vectors.truncate(count));
+        displacement_gradient.truncate(count);
+        [volume, mass, &mut self.dilatation].into_iter().for_each(|numbers| numbers.truncate(count));
+        [body, id].into_iter().for_each(|numbers| numbers.truncate(count));
+        memory.truncate(count * self.remembered);
+    }
+
     /// The reference configuration of the nodal motion φ: that of the last grid reset, or the present one if the coming step resets the
     /// grid.
     #[inline(always)]

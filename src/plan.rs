@@ -7,7 +7,7 @@ pub use arrays::ArrayUse;
 use crate::approximation::ShapeFunction;
 use crate::material::Law;
 use crate::mechanics::dilatation::Cells;
-use crate::mechanics::loads::{Motion, Pressing, SurfaceLoad};
+use crate::mechanics::loads::{Motion, Pressing, SurfaceLoad, SurfacePoint};
 use crate::mechanics::reference::GridReset;
 use crate::mechanics::sweep::{SupportError, Supports};
 use crate::mechanics::terms::planned;
@@ -15,9 +15,11 @@ use crate::mechanics::unknowns::Unknowns;
 use crate::particles::Body;
 use crate::simulation::{Sharing, Simulation};
 use crate::solver::{Krylov, Preconditioning};
+use crate::tensor::Vector;
 use arrays::arrays;
 use indicatif::BinaryBytes;
 use serde::Serialize;
+use std::collections::BTreeMap;
 use std::fmt::{Display, Formatter};
 
 /// A term of the residual, or a part of the step, and whether this scene has it.
@@ -40,6 +42,10 @@ pub struct SurfaceUse {
     pub points: usize,
     /// The reference area of all points together.
     pub area: f64,
+    /// The areas of the sides: those whose outward normals lie along an axis, by the axis and its sign, and "oblique" for all others.
+    pub sides: BTreeMap<String, f64>,
+    /// The resultant force at the start, where the curve is 1.
+    pub force: Vec<f64>,
 }
 
 impl SurfaceUse {
@@ -57,16 +63,37 @@ impl SurfaceUse {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn of<const D: usize, L, A>(simulation: &Simulation<D, L, A>) -> Vec<Self> {
-        let describe = |load: &SurfaceLoad<D>| Self {
-            load: match load.pressing {
-                Pressing::Traction(_) => "traction",
-                Pressing::Pressure(_) => "follower pressure",
-            },
-            points: load.points.len(),
-            area: load.points.iter().map(|point| point.area).sum(),
+        let describe = |load: &SurfaceLoad<D>| {
+            let mut sides = BTreeMap::new();
+            let mut force = Vector::<f64, D>::zeros();
+            for SurfacePoint { normal, area, .. } in &load.points {
+                *sides.entry(side(normal)).or_default() += area;
+                force += match &load.pressing {
+                    Pressing::Traction(traction) => traction * *area,
+                    Pressing::Pressure(pressure) => normal * (-pressure * area),
+                };
+            }
+            Self {
+                load: match load.pressing {
+                    Pressing::Traction(_) => "traction",
+                    Pressing::Pressure(_) => "follower pressure",
+                },
+                points: load.points.len(),
+                area: load.points.iter().map(|point| point.area).sum(),
+                sides,
+                force: force.iter().copied().collect(),
+            }
         };
         simulation.loads.surface.iter().map(describe).collect()
     }
+}
+
+/// The side of a body with an outward unit normal: "right" for +x, "left" for −x, and so on.
+fn side<const D: usize>(normal: &Vector<f64, D>) -> String {
+    const SIDES: [[&str; 2]; 3] = [["left", "right"], ["bottom", "top"], ["back", "front"]];
+    let k = normal.iamax();
+    let is_along = normal[k].abs() > 1.0 - 1e-6;
+    if is_along { SIDES[k.min(2)][usize::from(normal[k] > 0.0)].to_owned() } else { "oblique".to_owned() }
 }
 
 /// A run needs more memory than is available.
@@ -252,8 +279,11 @@ impl Display for Plan {
         for term in &self.terms {
             writeln!(f, "  {} {:<22} {}", if term.used { "on " } else { "off" }, term.name, term.why)?;
         }
-        for SurfaceUse { load, points, area } in &self.surfaces {
-            writeln!(f, "  surface: {load} on {points} points, area {area:.6} in all")?;
+        for SurfaceUse { load, points, area, sides, force } in &self.surfaces {
+            let sides: Vec<String> = sides.iter().map(|(side, area)| format!("{side} {area:.6}")).collect();
+            let force: Vec<String> = force.iter().map(|one| format!("{one:.6}")).collect();
+            let (sides, force) = (sides.join(", "), force.join(", "));
+            writeln!(f, "  surface: {load} on {points} points, area {area:.6} in all ({sides}), resultant ({force})")?;
         }
         for bodies in &self.sharing {
             writeln!(f, "contact       {bodies}")?;

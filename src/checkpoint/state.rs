@@ -2,7 +2,7 @@
 
 use super::container::Arrays;
 use crate::clock::Reached;
-use crate::mechanics::loads::{Contacts, Loads, Obstacle, Reaction, RigidBody};
+use crate::mechanics::loads::{Added, Contacts, Loads, Obstacle, Reaction, RigidBody, SurfacePoint};
 use crate::mechanics::path::Path;
 use crate::mechanics::reference::LastEquilibrium;
 use crate::mechanics::transfer::Nodal;
@@ -18,7 +18,7 @@ use std::borrow::Cow;
 type NamedArray<'a> = (&'static str, Cow<'a, [f64]>);
 
 /// Prefixes of arrays that may be absent or vary in length.
-const VARYING: [&str; 4] = ["reference_", "grid_", "bonded", "equilibrium"];
+const VARYING: [&str; 6] = ["reference_", "grid_", "bonded", "equilibrium", "slips", "added_points"];
 
 /// The arrays of the state at tₙ, by name. The patterns name every field: a new field does not compile until somebody decides whether it is
 /// stored. A new array is added here and in [`restore`].
@@ -68,6 +68,12 @@ pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) 
         ("path", vec![*load, *increment, *speed, *weight].into()),
         ("contacts", contact_state(&loads.contacts).into()),
     ];
+    if loads.contacts.exist() {
+        arrays.extend([
+            ("slips", slips(&loads.contacts).into()),
+            ("added_points", loads.contacts.added.iter().flat_map(row).collect()),
+        ]);
+    }
     if let Some(Configuration { position, displacement_gradient, dilatation }) = reference {
         arrays.extend([
             ("reference_position", numbers(position)),
@@ -95,7 +101,7 @@ pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) 
     arrays
 }
 
-/// Work, friction loss, anchors and free motion of every obstacle; stored energy, friction losses and slips between bodies.
+/// Work, friction loss, anchors and free motion of every obstacle; stored energy and friction losses between bodies.
 fn contact_state<const D: usize>(contacts: &Contacts<D>) -> Vec<f64> {
     let of = |one: &Obstacle<D>| {
         let losses = [one.work, one.friction_loss].into_iter().chain(one.anchors.iter().flatten().copied());
@@ -105,13 +111,27 @@ fn contact_state<const D: usize>(contacts: &Contacts<D>) -> Vec<f64> {
     if let Some(between) = &contacts.between {
         all.push(between.energy);
         all.extend(between.pairs.iter().map(|pair| pair.friction_loss));
-        all.extend(between.slips.iter().flatten());
     }
     all
 }
 
-/// Sets what [`contact_state`] returns. The length of `numbers` fits.
-fn set_contact_state<const D: usize>(contacts: &mut Contacts<D>, mut numbers: &[f64]) {
+/// A point that was added to a surface: the halved piece and its edge, or the particle, its area and normal.
+fn row<const D: usize>(added: &Added<D>) -> Vec<f64> {
+    let (key, axis, area, normal) = match *added {
+        Added::Half { number, axis } => (number as f64, axis as f64, 0.0, Vector::zeros()),
+        Added::Bare { id, normal, area } => (f64::from(id), 0.0, area, normal),
+    };
+    [key, axis, area].into_iter().chain(normal.iter().copied()).collect()
+}
+
+/// The elastic slips between bodies: point, pair and slip, one after the other.
+fn slips<const D: usize>(contacts: &Contacts<D>) -> Vec<f64> {
+    let slips = contacts.between.iter().flat_map(|between| &between.slips);
+    slips.flat_map(|(key, slip)| key.map(|number| number as f64).into_iter().chain(slip.iter().copied())).collect()
+}
+
+/// Sets what [`contact_state`] and [`slips`] return. The length of `numbers` fits.
+fn set_contact_state<const D: usize>(contacts: &mut Contacts<D>, mut numbers: &[f64], slips: &[f64]) {
     for one in &mut contacts.obstacles {
         let [work, friction_loss, rest @ ..] = numbers else { return };
         (one.work, one.friction_loss) = (*work, *friction_loss);
@@ -122,9 +142,9 @@ fn set_contact_state<const D: usize>(contacts: &mut Contacts<D>, mut numbers: &[
     }
     if let (Some(between), [energy, rest @ ..]) = (&mut contacts.between, numbers) {
         between.energy = *energy;
-        let (losses, slips) = rest.split_at(between.pairs.len().min(rest.len()));
-        between.pairs.iter_mut().zip(losses).for_each(|(pair, loss)| pair.friction_loss = *loss);
-        between.slips.iter_mut().flatten().zip(slips).for_each(|(slip, number)| *slip = *number);
+        between.pairs.iter_mut().zip(rest).for_each(|(pair, loss)| pair.friction_loss = *loss);
+        let slip = |one: &[f64]| ([one[0] as usize, one[1] as usize], Vector::from_column_slice(&one[2..]));
+        between.slips = slips.chunks_exact(2 + D).map(slip).collect();
     }
 }
 
@@ -192,14 +212,16 @@ fn grid<const D: usize>(arrays: &Arrays) -> Result<Option<Nodes<D>>, String> {
 /// An array does not fit the number of particles or of prescribed conditions.
 fn equilibrium<const D: usize>(
     arrays: &Arrays,
-    particles: usize,
+    (particles, fields): (usize, usize),
     loads: &Loads<D>,
 ) -> Result<Option<LastEquilibrium<D>>, String> {
     let numbers: Vec<f64> = values(arrays, "equilibrium");
     let Some((touching, forces)) = numbers.split_first() else { return Ok(None) };
     let positions: Vec<Vector<f64, D>> = values(arrays, "equilibrium_field_positions");
-    let expected = if loads.field.is_some() { particles } else { 0 };
-    if forces.len() != loads.prescribed.len() * (D + 1) || positions.len() != expected {
+    // Points that were added to surfaces after the step have no position there.
+    let positions_fit =
+        if loads.field.is_some() { (1..=particles).contains(&positions.len()) } else { positions.is_empty() };
+    if forces.len() != loads.prescribed.len() * fields * (D + 1) || !positions_fit {
         return Err("the last equilibrium of other particles or conditions".into());
     }
     let reaction = |one: &[f64]| Reaction { force: Vector::from_column_slice(&one[..D]), torque: one[D] };
@@ -226,6 +248,45 @@ pub(super) fn restore<const D: usize, L, A>(
     reached: Reached,
     arrays: &Arrays,
 ) -> Result<(), String> {
+    let (count, contacts) = (simulation.particles.len(), simulation.loads.contacts.clone());
+    let restored = refine(simulation, arrays).and_then(|()| restore_refined(simulation, reached, arrays));
+    if restored.is_err() {
+        simulation.particles.truncate(count);
+        simulation.loads.contacts = contacts;
+    }
+    restored
+}
+
+/// Adds the points that were added to surfaces since the start.
+///
+/// # Errors
+/// A piece of surface or a particle that does not exist.
+fn refine<const D: usize, L, A>(simulation: &mut Simulation<D, L, A>, arrays: &Arrays) -> Result<(), String> {
+    let Simulation { particles, loads, .. } = simulation;
+    mutant!("checkpoint: surfaces are those of the start": { return Ok(()); });
+    for row in values::<f64>(arrays, "added_points").chunks_exact(3 + D) {
+        let (key, area, normal) = (row[0] as usize, row[2], Vector::from_column_slice(&row[3..]));
+        if area > 0.0 {
+            let particle = particles.place(key).ok_or("a point of a surface that is no particle")?;
+            loads.contacts.cover(key as u32, SurfacePoint::new(particle, normal, area));
+        } else {
+            let point = loads.contacts.points.get(key).filter(|_| row[1] < 2.0);
+            let new = particles.push_copy(point.ok_or("a piece of surface that is not in the scene")?.particle);
+            loads.contacts.halve(key, row[1] as usize, new);
+        }
+        for obstacle in loads.contacts.obstacles.iter_mut().filter(|obstacle| !obstacle.anchors.is_empty()) {
+            obstacle.anchors.push(Vector::zeros());
+        }
+    }
+    Ok(())
+}
+
+/// Sets a simulation whose surfaces are refined.
+fn restore_refined<const D: usize, L, A>(
+    simulation: &mut Simulation<D, L, A>,
+    reached: Reached,
+    arrays: &Arrays,
+) -> Result<(), String> {
     let varies = |name: &str| VARYING.iter().any(|start| name.starts_with(start));
     for (name, values) in inherited(simulation).into_iter().filter(|(name, _)| !varies(name)) {
         let found = arrays.get(name).ok_or_else(|| format!("no array {name}"))?;
@@ -241,11 +302,11 @@ pub(super) fn restore<const D: usize, L, A>(
     }
     let clock = simulation.clock.at(reached).ok_or("a time that the clock cannot show")?;
     let mut loads = simulation.loads.clone();
-    set_contact_state(&mut loads.contacts, &arrays["contacts"]);
+    set_contact_state(&mut loads.contacts, &arrays["contacts"], arrays.get("slips").map_or(&[], Vec::as_slice));
     mutant!("checkpoint: the anchors of friction are forgotten": loads = simulation.loads.clone());
-    let equilibrium = equilibrium(arrays, count, &loads)?;
-    simulation.clock = clock;
-    simulation.loads = loads;
+    let fields = simulation.bodies.iter().map(|body| body.field as usize + 1).max().unwrap_or(1);
+    let equilibrium = equilibrium(arrays, (count, fields), &loads)?;
+    (simulation.clock, simulation.loads) = (clock, loads);
     simulation.forget();
     simulation.history.equilibrium = equilibrium;
     // Particle data without an array is rearranged, too.

@@ -65,7 +65,7 @@ pub enum CheckError {
     /// The tangent that a law from a shared library claims is not the derivative of its stress.
     #[error(
         "the law of particle {particle} claims a tangent that is not the derivative of its stress in this step: {sentence}; check the law \
-         (bfree check-law), also whether its stress turns with the body"
+         (tangent-check), also whether its stress turns with the body"
     )]
     Claim {
         /// Id of the particle.

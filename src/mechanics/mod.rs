@@ -5,7 +5,6 @@ pub mod check;
 pub mod constitutive;
 pub(crate) mod contact;
 pub(crate) mod dilatation;
-pub(crate) mod facing;
 mod joined_cells;
 pub mod loads;
 mod local_form;

@@ -70,7 +70,12 @@ impl Field {
         let recalled = |name| internal_variable(law, &at(), name).unwrap_or(0.0);
         match self {
             Self::Position => out.extend(padded(&particles.position[place])),
-            Self::Displacement => out.extend(padded(&(particles.position[place] - reference.position[id]))),
+            Self::Displacement => {
+                let particles_then = reference.position.len();
+                let then = reference.position.get(id);
+                let then = then.ok_or(OutputError::NoParticle { particle: id, particles: particles_then })?;
+                out.extend(padded(&(particles.position[place] - then)));
+            }
             Self::Velocity => out.extend(rate(&particles.velocity)?),
             Self::Acceleration => out.extend(rate(&particles.acceleration)?),
             Self::DeformationGradient => out.extend(&(identity::<f64, 3>() + embed(&at().h)).transpose()),

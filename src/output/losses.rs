@@ -54,9 +54,11 @@ impl Cause {
                 "shorten time.step, with which the loss falls; time.lumping = 1 keeps more energy where bodies meet at more than about a \
                  tenth of their speed of sound"
             }
-            (Self::Obstacle, false) => "shorten time.step, with which the loss falls",
+            (Self::Obstacle, false) => {
+                "a contact that is a third as stiff keeps more energy (the key stiffness of obstacles and contact), and so does a finer grid"
+            }
             (Self::Obstacle, true) => {
-                "time.lumping = 0.1 with \"grid\": {\"reset\": {\"strain\": 0.1}} keeps most energy; then shorten time.step"
+                "time.lumping = 0.1 with \"grid\": {\"reset\": {\"strain\": 0.3}} keeps most energy; then lower the stiffness of the contact"
             }
             (Self::NewGrid, _) => {
                 "keep the grid where bodies are free: \"grid\": {\"reset\": {\"strain\": 0.1}}, or \"never\""

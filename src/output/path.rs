@@ -27,7 +27,8 @@ pub(crate) struct Point {
 impl Point {
     pub(crate) fn of<const D: usize, L, A>(simulation: &Simulation<D, L, A>, reference: &Reference<D>) -> Self {
         let particles = &simulation.particles;
-        let first = |p: usize| &reference.position[particles.id[p] as usize];
+        // Points that were added to surfaces have no volume.
+        let first = |p: usize| reference.position.get(particles.id[p] as usize).unwrap_or(&particles.position[p]);
         let volume: f64 = particles.volume.iter().sum();
         let mut middle = Vector::<f64, D>::zeros();
         for (p, part) in particles.volume.iter().enumerate() {

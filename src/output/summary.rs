@@ -65,7 +65,11 @@ impl Display for Summary {
             writeln!(f, "momentum  changed by {change:.3e}; sum of m |v| is {scale:.3e}")?;
         } else {
             let sign = if *balance > 0.0 { "+" } else { "-" };
-            writeln!(f, "energy    strain {strain:.6e} = {terms} {sign} rest of the load steps {size:.3e}")?;
+            let in_contact = if *contact > 0.0 { format!(" + contact {contact:.6e}") } else { String::new() };
+            writeln!(
+                f,
+                "energy    strain {strain:.6e}{in_contact} = {terms} {sign} rest of the load steps {size:.3e}"
+            )?;
         }
         writeln!(
             f,
@@ -82,9 +86,6 @@ impl Display for Summary {
         }
         for touched in &self.pairs {
             writeln!(f, "contact   {touched}")?;
-        }
-        for Warning { time, step, message, .. } in &self.warnings {
-            writeln!(f, "warned    t = {time}, step {step}: {message}")?;
         }
         let seconds = seconds.named().map(|(name, x)| format!("{} {x:.2}", name.replace('_', " ")));
         write!(f, "seconds   {}", seconds.collect::<Vec<_>>().join(", "))

@@ -217,8 +217,11 @@ impl Run {
         let summary = steps.recorder.finish(&steps.simulation, inputs, outcome).map_err(Failure::run)?;
         let place = directory.display();
         if !self.quiet {
-            let again: String = warnings.iter().map(|text| format!("\nwarned    {text}")).collect();
-            print(format_args!("{summary}{again}\nresults   {place}"))?;
+            let told = match warnings.len() + summary.warnings.len() {
+                0 => String::new(),
+                count => format!("\nwarnings  {count}, told above and kept in report.json"),
+            };
+            print(format_args!("{summary}{told}\nresults   {place}"))?;
         }
         if self.plot {
             let drawn = plot_run(directory, &Look::default()).map_err(Failure::run)?;

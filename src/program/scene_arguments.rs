@@ -86,7 +86,10 @@ impl SceneArguments {
         let rest = simulation.clock.rest(end).map_or_else(String::new, |rest| format!(" and one of {rest:.6}"));
         lines.push(format!("steps         {steps} of {step}{rest} to t = {end}"));
         lines.extend(scene.filled(&simulation).iter().map(|body| format!("body          {body}")));
-        if simulation.bodies.len() > 1 {
+        let mut fields = simulation.bodies.iter().map(|body| body.field).collect::<Vec<_>>();
+        fields.sort_unstable();
+        fields.dedup();
+        if simulation.bodies.len() > 1 && fields.len() < simulation.bodies.len() {
             let h = scene.grid.spacing;
             let felt = match scene.approximation.contact_distance() {
                 Some([least, most]) => {

@@ -1,7 +1,7 @@
 //! Contact between bodies, and checks of all contacts.
 
 use super::Scene;
-use super::obstacle::{check_law, default_stiffness, too_stiff};
+use super::obstacle::{check_law, too_stiff};
 use super::time::word;
 use crate::mechanics::schemes::Parameters;
 use crate::problems::Problems;
@@ -20,10 +20,9 @@ pub struct Contact {
     #[schemars(range(min = 0, max = 100))]
     pub friction: f64,
     /// The penalty stiffness, > 0: the pressure at a depth of one grid spacing, in units of Λ + 2G of the softer body, or of 4G where that is
-    /// less. Default: 1.
-    #[serde(default = "default_stiffness")]
+    /// less. Default: that of obstacles.
     #[schemars(extend("exclusiveMinimum" = 0))]
-    pub stiffness: f64,
+    pub stiffness: Option<f64>,
     /// Groups of names of bodies. Bodies of a group share one nodal field, and stick to each other where they share nodes. A body in no group
     /// is a group of its own.
     #[serde(default)]
@@ -112,6 +111,14 @@ impl Scene {
         }
         if let Some(contact) = &self.contact {
             contact.check(problems, &self.body_names(), dimension);
+            let mean = "time.scheme is \"energy_momentum\", which would not keep the energy where two deformable bodies meet: take \"newmark\", or \
+                        let the bodies meet obstacles only";
+            problems.require(
+                self.time.scheme() != Parameters::EnergyMomentum,
+                "contact",
+                "contact between bodies",
+                mean,
+            );
         }
     }
 }

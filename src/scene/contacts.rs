@@ -5,7 +5,7 @@ use super::body::Body;
 use super::filling::Builder;
 use super::free::surface;
 use super::load::{Loaded, Stress};
-use crate::mechanics::facing::{Overlap, overlaps};
+use crate::mechanics::contact::{Path, paths};
 use crate::mechanics::loads::{BodyContact, Contacts, Obstacle, SurfacePoint};
 use crate::mechanics::sweep::stride;
 use crate::shape::{self, Cloud, CloudPoint, SURFACE_DEPTH};
@@ -38,13 +38,14 @@ impl<const D: usize> Builder<'_, D> {
     /// The contacts, and points on the whole surface of every body, if there are contacts. Where bodies of one nodal field are joined, there is no
     /// surface.
     pub(super) fn contacts(&mut self, gravity: &Vector<f64, D>) -> Result<Contacts<D>, BuildError> {
-        let scene = self.scene;
+        let (scene, stiffness) = (self.scene, self.scene.contact_stiffness());
         let mut contacts = Contacts::default();
         for (i, one) in scene.obstacles.iter().enumerate() {
             let path = format!("obstacles[{i}]");
             let (shape, motion) = (one.shape.built(&path)?, one.motion().motion(0)?);
             let free = one.free.as_ref().map(|free| free.build(&path, &shape, gravity)).transpose()?;
-            let obstacle = Obstacle::new(one.name.clone(), shape, motion, one.stiffness, one.friction);
+            let obstacle =
+                Obstacle::new(one.name.clone(), shape, motion, one.stiffness.unwrap_or(stiffness), one.friction);
             contacts.obstacles.push(Obstacle { free, ..obstacle });
         }
         if contacts.has_free_obstacle() {
@@ -60,7 +61,8 @@ impl<const D: usize> Builder<'_, D> {
                 );
                 return Err(BuildError::at("contact", what));
             }
-            contacts.between = Some(BodyContact::new(contact.stiffness, contact.friction, &fields));
+            contacts.between =
+                Some(BodyContact::new(contact.stiffness.unwrap_or(stiffness), contact.friction, &fields));
         }
         if !contacts.exist() {
             return Ok(contacts);
@@ -97,7 +99,7 @@ impl<const D: usize> Builder<'_, D> {
         self.make_room(&format!("bodies[{number}].particles"), surface.len())?;
         let mut points = Vec::new();
         for CloudPoint { particle, position, normal, area } in surface {
-            points.push(SurfacePoint { particle: self.particles.len(), normal, area });
+            points.push(SurfacePoint::new(self.particles.len(), normal, area));
             let velocity = self.particles.velocity.get(particle).copied().unwrap_or_else(Vector::zeros);
             // The particles of a file may lie nearer to the box than half their edge.
             let depth = SURFACE_DEPTH * self.grid.spacing;
@@ -216,12 +218,10 @@ impl<const D: usize> Builder<'_, D> {
         let positions: Vec<_> = contacts.points.iter().map(|point| particles.position[point.particle]).collect();
         let of = |pair: usize| between.pairs[pair].bodies.map(|body| &bodies[body as usize]);
         let touches =
-            |one: &Overlap| one.depth > DEEPEST_START * h && of(one.pair).iter().any(|body| body.shape.is_none());
-        let overlaps = overlaps(contacts, between, particles, &self.grid, &positions).into_iter().filter(touches);
-        let Some(Overlap { number, pair, depth }) = overlaps.max_by(|one, other| one.depth.total_cmp(&other.depth))
-        else {
-            return Ok(());
-        };
+            |one: &Path| one.depth[1] > DEEPEST_START * h && of(one.pair).iter().any(|body| body.shape.is_none());
+        let paths = paths(contacts, between, particles, &self.grid, |number| [positions[number]; 2]);
+        let deepest = paths.into_iter().filter(touches).max_by(|one, other| one.depth[1].total_cmp(&other.depth[1]));
+        let Some(Path { number, pair, depth: [_, depth], .. }) = deepest else { return Ok(()) };
         let [one, other] = of(pair).map(|body| &body.name);
         let what = format!(
             "bodies {one:?} and {other:?} start in each other: their surfaces overlap by {:.3} grid spacings at {:?}, and {DEEPEST_START} \

@@ -1,8 +1,10 @@
 //! Defaults that depend on other keys of the scene.
 
+use super::body::Body;
 use super::{Scene, accuracy, boundary, transfer};
 use crate::field::Field;
 use crate::material::{Law, PLASTIC_STRAIN};
+use crate::mechanics::contact::contact_modulus;
 use crate::mechanics::reference::GridReset;
 use crate::mechanics::schemes::{LONG_STEPS, Parameters};
 use crate::problems::Problems;
@@ -15,6 +17,13 @@ const VIBRATION_STRAIN: f64 = 0.1;
 
 /// The default of `time.lumping` where bodies may touch obstacles or each other (`docs/src/obstacles.md`).
 const LUMPING_IN_CONTACT: f64 = 0.1;
+
+/// The strain up to which a grid is kept where bodies may touch obstacles or each other. A new grid loses a part of the vibrations that impacts
+/// cause (`docs/src/obstacles.md`).
+const CONTACT_STRAIN: f64 = 0.3;
+
+/// The largest default stiffness of contact, and its largest product with the Courant number (`docs/src/obstacles.md`).
+const STIFFNESS: [f64; 2] = [1.0, 2.0];
 
 /// A body that comes this near to a face of the box, in spacings, touches it.
 const TOUCHES: f64 = 1e-9;
@@ -33,6 +42,11 @@ impl Scene {
             self.transfer.get_or_insert_default();
         }
         self.aggregation = Some(self.aggregates());
+        let stiffness = self.contact_stiffness();
+        let contacts = self.obstacles.iter_mut().map(|one| &mut one.stiffness);
+        contacts.chain(self.contact.iter_mut().map(|one| &mut one.stiffness)).for_each(|one| {
+            one.get_or_insert(stiffness);
+        });
         self.output.fields = Some(self.fields());
         self
     }
@@ -68,11 +82,22 @@ impl Scene {
         let keeps_energy = self.time.scheme() == Parameters::EnergyMomentum;
         self.grid.given_reset().unwrap_or(match self.time.scheme().has_inertia() {
             false => GridReset::Strain(STATIC_STRAIN),
-            true if flip && (self.is_clamped() || self.has_contact() || keeps_energy) => {
-                GridReset::Strain(VIBRATION_STRAIN)
-            }
+            true if flip && self.has_contact() => GridReset::Strain(CONTACT_STRAIN),
+            true if flip && (self.is_clamped() || keeps_energy) => GridReset::Strain(VIBRATION_STRAIN),
             true => GridReset::EveryStep,
         })
+    }
+
+    /// The default stiffness of contact. A contact that is too stiff for the step makes bodies vibrate, and loses energy.
+    pub(super) fn contact_stiffness(&self) -> f64 {
+        let [most, of_courant] = STIFFNESS;
+        let speed = |body: &Body| {
+            let law = body.material.law(&mut Problems::default(), "")?;
+            Some((contact_modulus(&law) / body.density).sqrt())
+        };
+        let fastest = self.bodies.iter().filter_map(speed).fold(0.0, f64::max);
+        let courant = fastest * self.time.step / self.grid.spacing;
+        if self.time.scheme().has_inertia() && courant * most > of_courant { of_courant / courant } else { most }
     }
 
     /// Whether the scene has one body, and its shape reaches a fixed face of the box.

@@ -33,8 +33,8 @@ pub struct GridBox {
     pub spacing: f64,
     /// When the background grid is reset. Between resets, the result does not depend on the number of steps, stresses are smooth, and
     /// bodies stay on the walls that they touch. Default: `{"strain": 1}` in load steps. With inertia and the transfer `"flip"`,
-    /// `{"strain": 0.1}` with `obstacles` or `contact`, and for a single body that a fixed face of the box holds from the start. Otherwise
-    /// `"every_step"`.
+    /// `{"strain": 0.3}` with `obstacles` or `contact`, and `{"strain": 0.1}` for a single body that a fixed face of the box holds from the
+    /// start. Otherwise `"every_step"`.
     pub reset: Option<GridReset>,
     /// Deprecated, and read for one release: the key is now `reset`. If `reset` is given, this key has no effect.
     pub renewed: Option<GridReset>,

@@ -105,7 +105,7 @@ impl Audit {
         let most = if schema["format"] == "uint8" { u8::MAX.into() } else { u32::MAX.into() };
         match (types(schema).first().copied(), value) {
             (Some("object"), Value::Object(object)) => self.object(schema, object),
-            (Some("object"), _) => self.mismatch("an object", value),
+            (Some("object"), _) => self.mismatch(&an_object(schema), value),
             (Some("array"), Value::Array(list)) => {
                 for (i, value) in list.iter().enumerate() {
                     self.within(Step::Index(i), schema["prefixItems"].get(i).unwrap_or(&schema["items"]), value);
@@ -180,6 +180,19 @@ impl Audit {
     }
 }
 
+/// The words "an object" with its keys, such as {"acceleration": [0, 0], …} for a gravity that is given as a number.
+fn an_object(schema: &Value) -> String {
+    let keys = schema["properties"].as_object().into_iter().flatten().map(|(key, _)| format!("`{key}`"));
+    let keys: Vec<String> = keys.collect();
+    let required = schema["required"].as_array().into_iter().flatten().filter_map(Value::as_str);
+    let required: Vec<String> = required.map(|key| format!("`{key}`")).collect();
+    match (keys.is_empty(), required.is_empty()) {
+        (true, _) => "an object".to_owned(),
+        (_, true) => format!("an object with some of the keys {}", keys.join(", ")),
+        _ => format!("an object with the keys {}", required.join(", ")),
+    }
+}
+
 fn describe(schema: &Value, value: &Value, at: &str, keys: &mut Vec<Key>) {
     let schema = resolved(schema);
     let below = |key: &str| if at.is_empty() { key.to_owned() } else { format!("{at}.{key}") };
@@ -219,7 +232,8 @@ const MAX_EDITS: usize = 2;
 /// Maximum length of a word; no key is longer.
 const MAX_LETTERS: usize = 64;
 
-/// The word of `allowed` nearest to `word`, if it is at most two letters away and shares at least one.
+/// The word of `allowed` nearest to `word`, if it is at most two letters away and shares at least one. Otherwise the one with `word` among its
+/// parts, such as `von_mises` for `mises`.
 pub(super) fn nearest<'a>(word: &str, allowed: &[&'a str]) -> Option<&'a str> {
     let letters = word.chars().count();
     if letters > MAX_LETTERS {
@@ -231,6 +245,7 @@ pub(super) fn nearest<'a>(word: &str, allowed: &[&'a str]) -> Option<&'a str> {
         .filter(|(edits, candidate)| *edits <= MAX_EDITS && *edits < letters.min(candidate.len()))
         .min_by_key(|(edits, _)| *edits)
         .map(|(_, candidate)| candidate)
+        .or_else(|| allowed.iter().find(|candidate| candidate.split('_').any(|part| part == word)).copied())
 }
 
 #[cfg(test)]
@@ -240,6 +255,7 @@ mod tests {
     #[test]
     fn only_near_words_are_suggested() {
         assert_eq!(nearest("sape", &["name", "shape"]), Some("shape"));
+        assert_eq!(nearest("mises", &["neo_hookean", "von_mises"]), Some("von_mises"));
         assert_eq!(nearest("mass", &["density", "velocity"]), None);
         assert_eq!(nearest("of", &["by"]), None);
     }

@@ -91,7 +91,7 @@ impl<const D: usize> Builder<'_, D> {
                     && shape::is_above(depth, spacing)
                     && region.as_ref().is_none_or(|region| region.holds(x, h))
             };
-            let point = |particle| SurfacePoint { particle, normal, area: given.area };
+            let point = |particle| SurfacePoint::new(particle, normal, given.area);
             return Ok((0..particles.len()).filter(loaded).map(point).collect());
         }
         let Some(shape) = &shape else { return Ok(Vec::new()) };
@@ -100,7 +100,7 @@ impl<const D: usize> Builder<'_, D> {
         let velocity = body.velocity.as_ref().map_or_else(Vector::zeros, |v| vector(v));
         let mut points = Vec::new();
         for facet in facets {
-            points.push(SurfacePoint { particle: self.particles.len(), normal: facet.normal, area: facet.area });
+            points.push(SurfacePoint::new(self.particles.len(), facet.normal, facet.area));
             // Each point lies inside the surface by a tolerance, in a cell that holds the body.
             let x = facet.position - facet.normal * (shape::SURFACE_DEPTH * h);
             self.push(x, velocity, 0.0, 0.0, number);

@@ -22,10 +22,10 @@ pub struct Obstacle {
     #[schemars(range(min = 0, max = 100))]
     pub friction: f64,
     /// The penalty stiffness, > 0: the pressure at a depth of one grid spacing, in units of Λ + 2G of the body, or of 4G where that is less.
-    /// Default: 1.
-    #[serde(default = "default_stiffness")]
+    /// Default: 1; with inertia at most 2 h/(c Δt), so that a contact lasts several steps. c is the largest √(M/ρ) of all bodies, with that
+    /// modulus M.
     #[schemars(extend("exclusiveMinimum" = 0))]
-    pub stiffness: f64,
+    pub stiffness: Option<f64>,
     /// A table of displacements since t = 0 (length); constant after the last row. A component that is null rests.
     pub displacement: Option<Table>,
     /// A table of velocities; constant after the last row. A component that is null rests.
@@ -36,25 +36,22 @@ pub struct Obstacle {
     pub free: Option<Free>,
 }
 
-/// The stiffness of contact that delays a rebound by a few percent of the time of contact, and needs few Newton iterations.
-pub(super) fn default_stiffness() -> f64 {
-    1.0
-}
-
 /// A larger stiffness gets a warning. At 100, the force of an impact rings with four times its value (`docs/src/obstacles.md`).
 const STIFFEST: f64 = 100.0;
 
 /// Checks the constants of contact.
-pub(super) fn check_law(problems: &mut Problems, path: &str, friction: f64, stiffness: f64, dimension: usize) {
+pub(super) fn check_law(problems: &mut Problems, path: &str, friction: f64, stiffness: Option<f64>, dimension: usize) {
     problems.between(&format!("{path}.friction"), friction, 0.0, 100.0);
     let allowed = "must be 0: in one dimension nothing slides";
     problems.require(dimension > 1 || friction == 0.0, &format!("{path}.friction"), friction, allowed);
-    problems.positive(&format!("{path}.stiffness"), stiffness);
+    if let Some(stiffness) = stiffness {
+        problems.positive(&format!("{path}.stiffness"), stiffness);
+    }
 }
 
 /// A warning about a stiffness that gains nothing.
-pub(super) fn too_stiff(path: &str, stiffness: f64) -> Option<String> {
-    (stiffness > STIFFEST).then(|| {
+pub(super) fn too_stiff(path: &str, stiffness: Option<f64>) -> Option<String> {
+    stiffness.filter(|stiffness| *stiffness > STIFFEST).map(|stiffness| {
         format!(
             "{path}.stiffness = {stiffness:e} is above {STIFFEST}: the depth is negligible below that already, and Newton's method and the \
              force get worse; lower it"

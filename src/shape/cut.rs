@@ -300,12 +300,14 @@ impl<const D: usize> Shape<D> {
         for shape in std::iter::once(self).chain(region) {
             departure = departure.max(shape.solid().add_planes(&center, radius, &mut planes));
         }
-        let planes = distinct(planes, radius, of.round_off());
+        let mut planes = distinct(planes, radius, of.round_off());
+        // Images of a solid may give their planes in another order.
+        planes.sort_by(|(one, _), (other, _)| one.total_cmp(other));
         let is_flat =
             departure <= flat * of.spacing && !may_be_confused(&planes, departure) && planes.len() <= MAX_PLANES;
         mutant!("solids: a curved surface by one plane a box": is_flat = planes.len() <= MAX_PLANES);
         if !is_flat && radius > flat * of.spacing {
-            return of.halves().iter().for_each(|half| self.pieces(region, half, flat, visit));
+            return of.halves().for_each(|half| self.pieces(region, &half, flat, visit));
         }
         let cut = Cut { center, planes, departure: departure.min(2.0 * radius) };
         for simplex in cut.simplices(of) {

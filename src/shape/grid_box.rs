@@ -1,7 +1,7 @@
 //! Boxes on a grid, by which solids are cut.
 
 use super::EDGE;
-use crate::grid::Grid;
+use crate::grid::{Grid, indices};
 use crate::tensor::Vector;
 
 /// An axis-parallel box on a grid.
@@ -31,13 +31,16 @@ impl<const D: usize> GridBox<D> {
         EDGE * self.spacing
     }
 
-    /// The two halves of the box across its longest edge.
-    pub(super) fn halves(&self) -> [Self; 2] {
-        let k = self.edges.iamax();
-        let mut lower = *self;
-        lower.edges[k] *= 0.5;
-        let mut upper = lower;
-        upper.lower[k] += lower.edges[k];
-        [lower, upper]
+    /// The box halved across all of its longest edges, so that an image of a solid is divided into images.
+    pub(super) fn halves(&self) -> impl Iterator<Item = Self> {
+        let longest = self.edges.amax() * (1.0 - EDGE);
+        let halved = self.edges.map(|edge| edge.abs() >= longest);
+        let edges = Vector::from_fn(|k, _| if halved[k] { 0.5 * self.edges[k] } else { self.edges[k] });
+        let of = *self;
+        let count: [u64; D] = std::array::from_fn(|k| 1 + u64::from(halved[k]));
+        indices(count).map(move |i| {
+            let lower = of.lower + Vector::from_fn(|k, _| i[k] as f64 * edges[k]);
+            Self { lower, edges, ..of }
+        })
     }
 }

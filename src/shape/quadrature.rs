@@ -8,9 +8,10 @@
 
 use super::cut::{End, Facet, Piece};
 use super::moments::{few, in_simplex, whole_box};
-use super::{GridBox, Layout, Seed, Shape};
+use super::{GridBox, Layout, Seed, Shape, Similar};
 use crate::grid::indices;
-use crate::tensor::{Tensor, Vector};
+use crate::tensor::{Tensor, Vector, identity};
+use std::cmp::Ordering;
 
 /// The largest distance between a surface and its planes, relative to the spacing, where particles are quadrature points. The gap between
 /// surface and planes is integrated, too. Planes of neighbouring boxes do not quite meet, by the square of this number.
@@ -31,10 +32,79 @@ impl<const D: usize> Shape<D> {
     ///
     /// A thin part has one point. A part that is itself a box has Gauss points: `per_axis` along an axis, or as many as the degree needs.
     /// `None` for surfaces of triangles, of which only volumes and centroids are known, and if no such points are found.
+    ///
+    /// Images of a solid have images of these points. A box is measured with its axes in the order and in the directions in which the solid rises
+    /// there; where several orders are equal, the result is their mean.
     pub(super) fn quadrature(&self, of: &GridBox<D>, degree: u32, per_axis: u32) -> Option<Vec<Seed<D>>> {
         if !self.has_planes(of) {
             return None;
         }
+        let images = self.images(of);
+        let (first, fitted) = self.of_image(&images[0], of, degree, per_axis)?;
+        if !fitted || images.len() == 1 {
+            return Some(first);
+        }
+        let mut all: Vec<Seed<D>> = Vec::new();
+        for image in &images {
+            all.extend(self.of_image(image, of, degree, per_axis)?.0);
+        }
+        all.iter_mut().for_each(|point| point.volume /= images.len() as f64);
+        Some(all)
+    }
+
+    /// The images x ↦ c + R (x − c) of the solid about the centre of a box in which it rises along all axes, most along the first one: one, or
+    /// several where the part of the solid in the box is symmetric.
+    fn images(&self, of: &GridBox<D>) -> Vec<Tensor<f64, D>> {
+        let (center, radius) = of.around();
+        let value = |x: &Vector<f64, D>| self.signed_distance(&(center + x));
+        if value(&Vector::zeros()).abs() >= radius {
+            return vec![identity()];
+        }
+        let corner = |i: [u64; D]| Vector::<f64, D>::from_fn(|k, _| (i[k] as f64 - 0.5) * of.edges[k]);
+        let rise: Vector<f64, D> = indices([2; D]).map(corner).map(|x| x.map(f64::signum) * value(&x)).sum();
+        let rises = |image: &Tensor<f64, D>| image * rise;
+        let mut all = signed_permutations::<D>();
+        let order = |one: &Tensor<f64, D>, other: &Tensor<f64, D>| {
+            let falls = rises(other) - rises(one);
+            falls.iter().find(|fall| fall.abs() > of.round_off()).map_or(Ordering::Equal, |fall| fall.total_cmp(&0.0))
+        };
+        let Some(first) = all.iter().min_by(|one, other| order(one, other)).copied() else { return all };
+        all.retain(|image| order(image, &first).is_eq());
+        // Equal rises are symmetries only if the solid is the same everywhere in the box.
+        let places =
+            || indices([5; D]).map(|i| Vector::<f64, D>::from_fn(|k, _| (i[k] as f64 / 4.0 - 0.5) * of.edges[k]));
+        let is_same = |image: &Tensor<f64, D>| {
+            let at = |x: &Vector<f64, D>| value(&image.tr_mul(x)) - value(&first.tr_mul(x));
+            places().all(|x| at(&x).abs() <= of.round_off())
+        };
+        if all.len() > 1 {
+            all.retain(is_same);
+        }
+        all
+    }
+
+    /// Points of an image of the solid, taken back to the solid, and whether they were fitted.
+    fn of_image(
+        &self,
+        image: &Tensor<f64, D>,
+        of: &GridBox<D>,
+        degree: u32,
+        per_axis: u32,
+    ) -> Option<(Vec<Seed<D>>, bool)> {
+        mutant!("solids: quadrature points depend on the axes": { return self.quadrature_in_order(of, degree, per_axis); });
+        if *image == identity::<f64, D>() {
+            return self.quadrature_in_order(of, degree, per_axis);
+        }
+        let about = of.around().0;
+        let edges = image.abs() * of.edges;
+        let of = GridBox { lower: about - edges * 0.5, edges, ..*of };
+        let solid = Similar { of: Box::new(self.clone()), about, rotation: *image, factor: 1.0 };
+        let back = |point: Seed<D>| Seed { position: about + image.tr_mul(&(point.position - about)), ..point };
+        let (points, fitted) = Self::from(solid).quadrature_in_order(&of, degree, per_axis)?;
+        Some((points.into_iter().map(back).collect(), fitted))
+    }
+
+    fn quadrature_in_order(&self, of: &GridBox<D>, degree: u32, per_axis: u32) -> Option<(Vec<Seed<D>>, bool)> {
         let (pieces, gaps) = self.pieces_and_gaps(of);
         let flat: f64 = pieces.iter().map(|piece| piece.volume).sum();
         let volume = flat + gaps.iter().map(|gap| gap.volume).sum::<f64>();
@@ -42,30 +112,20 @@ impl<const D: usize> Shape<D> {
             // A thin part has one point, which the caller joins to a neighbour.
             let moment: Vector<f64, D> = pieces.iter().map(|piece| piece.centroid * piece.volume).sum();
             let has_volume = flat > 0.0 && volume > 0.0;
-            return Some(if has_volume { vec![Seed { position: moment / flat, volume }] } else { Vec::new() });
+            let points = if has_volume { vec![Seed { position: moment / flat, volume }] } else { Vec::new() };
+            return Some((points, false));
         }
         match whole_box(&pieces).filter(|_| gaps.is_empty()) {
-            Some(part) => Some(part.in_box(&Layout::Gauss.points(per_axis.max(degree / 2 + 1)))),
-            None => few(&pieces, &gaps, degree),
+            Some(part) => Some((part.in_box(&Layout::Gauss.points(per_axis.max(degree / 2 + 1))), false)),
+            None => Some((few(&pieces, &gaps, degree)?, true)),
         }
     }
 
-    /// The pieces of the solid in a box, and points of the gaps between their planes and the surface. The box begins at the corner that is
-    /// deepest in the solid, so a mirrored solid has mirrored pieces.
+    /// The pieces of the solid in a box, and points of the gaps between their planes and the surface.
     fn pieces_and_gaps(&self, of: &GridBox<D>) -> (Vec<Piece<D>>, Vec<Seed<D>>) {
-        let rise = |i: [u64; D]| {
-            let at: Vector<f64, D> = Vector::from_fn(|k, _| i[k] as f64);
-            at.add_scalar(-0.5) * self.signed_distance(&(of.lower + of.edges.component_mul(&at)))
-        };
-        let rise: Vector<f64, D> = indices([2; D]).map(rise).sum();
-        let mut from_deepest = *of;
-        for k in (0..D).filter(|&k| rise[k] < -of.round_off()) {
-            from_deepest.lower[k] += of.edges[k];
-            from_deepest.edges[k] = -of.edges[k];
-        }
         let rule = Layout::Gauss.points(GAP_POINTS);
         let (mut pieces, mut gaps) = (Vec::new(), Vec::new());
-        self.pieces(None, &from_deepest, FLAT_FOR_PARTICLES, &mut |piece, cut| {
+        self.pieces(None, of, FLAT_FOR_PARTICLES, &mut |piece, cut| {
             for end in self.ends(&piece, cut, of.round_off()).iter().filter(|end| end.departure > of.round_off()) {
                 self.add_gap(end, &rule, &mut gaps);
             }
@@ -132,6 +192,15 @@ impl<const D: usize> Shape<D> {
     }
 }
 
+/// All orders of the axes, in both directions each, as orthogonal tensors.
+fn signed_permutations<const D: usize>() -> Vec<Tensor<f64, D>> {
+    let all = indices([2 * D as u64; D]).map(|rows| {
+        let entry = |i: usize, k: usize| if rows[i] / 2 == k as u64 { 1.0 - 2.0 * (rows[i] % 2) as f64 } else { 0.0 };
+        Tensor::<f64, D>::from_fn(entry)
+    });
+    all.filter(|image| image * image.transpose() == identity::<f64, D>()).collect()
+}
+
 impl<const D: usize> Facet<D> {
     /// 2^(D−1) points with equal shares of the area, and with the centroid, spread and turn of the facet. On a flat facet the points are exact
     /// for polynomials of degree two. On a rectangle along the axes they are Gauss's points, exact for products of cubic polynomials. On a
@@ -185,7 +254,8 @@ mod tests {
             let lower = Vector::from_fn(|k, _| i[k] as f64 * edges[k]);
             let of = GridBox { lower, edges, spacing: edges[0] };
             let (all, gaps) = shape.pieces_and_gaps(&of);
-            let few = shape.quadrature(&of, degree, 1).unwrap();
+            // The pieces of an image lie elsewhere on a curved surface, so the axes keep their order here.
+            let (few, _) = shape.quadrature_in_order(&of, degree, 1).unwrap();
             let volume: f64 = few.iter().map(|point| point.volume).sum();
             if volume < THIN_PART * edges.product() {
                 continue;

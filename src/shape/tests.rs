@@ -110,6 +110,31 @@ fn the_volume_of_a_filled_ball_converges() {
 }
 
 #[test]
+fn mirrored_and_turned_solids_have_mirrored_and_turned_particles() {
+    let grid = Grid { origin: vector([0.0, 0.0]), spacing: 0.25, cells: [8, 8] };
+    let cut = |shape: &Shape<2>| fill(&grid, shape, regular(2, Fill::Cut)).unwrap();
+    let at = |[x, y]: [f64; 2]| vector([1.0 + x, 1.0 + y]);
+    let outline = [[0.31, 0.12], [-0.22, 0.57], [-0.41, -0.36]];
+    let solid = |image: fn([f64; 2]) -> [f64; 2]| -> [Shape<2>; 2] {
+        let vertices = outline.map(|x| at(image(x))).to_vec();
+        [Polygon::new(vertices).unwrap().into(), Ball { center: at(image([0.07, 0.21])), radius: 0.53 }.into()]
+    };
+    let images: [fn([f64; 2]) -> [f64; 2]; 3] = [|[x, y]| [y, x], |[x, y]| [-x, y], |[x, y]| [-y, x]];
+    for image in images {
+        for (solid, other) in solid(|x| x).iter().zip(solid(image)) {
+            let (seeds, others) = (cut(solid), cut(&other));
+            assert_eq!(seeds.len(), others.len());
+            for seed in &seeds {
+                let x = at(image([seed.position[0] - 1.0, seed.position[1] - 1.0]));
+                let near =
+                    |one: &&Seed<2>| (one.position - x).norm() < 1e-9 && (one.volume - seed.volume).abs() < 1e-12;
+                assert!(others.iter().any(|one| near(&one)), "no particle at {x}");
+            }
+        }
+    }
+}
+
+#[test]
 fn an_unbounded_shape_is_clipped_to_the_grid() {
     let grid = Grid { origin: vector([0.0, 0.0]), spacing: 1.0, cells: [4, 3] };
     let tilted = Shape::from(HalfSpace { point: vector([0.0, 3.0]), normal: vector([1.0, 1.0]) });

@@ -1,8 +1,8 @@
 //! Newton's method of a step: force balance at t_n + θ Δt, or at a point on an equilibrium path.
 
-use super::{InitialGuess, Simulation, StepError};
+use super::{Simulation, StepError};
 use crate::approximation::ShapeFunction;
-use crate::material::Law;
+use crate::material::{Law, Material};
 use crate::mechanics::loads::PrescribedDof;
 use crate::mechanics::path::OnPath;
 use crate::mechanics::residual::{Equilibrium, Inadmissible};
@@ -10,6 +10,7 @@ use crate::mechanics::rigid::loose;
 use crate::mechanics::sweep::Supports;
 use crate::mechanics::transfer::Nodal;
 use crate::mechanics::trial::Trial;
+use crate::particles::Body;
 use crate::pooled::Pooled;
 use crate::solver::{NewtonError, NewtonFailure, NewtonReport, Saddle, newton};
 use crate::tensor::Vector;
@@ -62,6 +63,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             phi[dof.node][dof.component] = theta * dof.step.increment;
         }
         phi.iter_mut().zip(&nodal.motion).for_each(|(phi, before)| *phi += before);
+        self.meet_obstacles(&equilibrium, prescribed, &mut phi)?;
         let mut preconditioner = self.preconditioner().0.anew::<D>();
         let (mut straight, mut dilatation) = (None, [Vec::new(), Vec::new()]);
         let newton = if scheme.follows_path() && !self.history.resets_grid() {
@@ -95,18 +97,6 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         Ok(Balance { equilibrium, phi, dilatation, newton, load, straight })
     }
 
-    /// The Δφ that Newton's method starts from.
-    fn initial_guess(&self, supports: &Supports<D>, nodal: &Nodal<D>, dt: f64) -> Pooled<Vector<f64, D>> {
-        let mut dphi: Pooled<Vector<f64, D>> = supports.field();
-        let rate: &[Vector<f64, D>] = match self.settings.initial_guess {
-            InitialGuess::Zero => &[],
-            InitialGuess::Velocity => &nodal.velocity,
-            InitialGuess::LastStep => &self.history.rate,
-        };
-        dphi.iter_mut().zip(rate).for_each(|(dphi, rate)| *dphi = rate * dt);
-        dphi
-    }
-
     /// Adds the cause to an error of Newton's method: without inertia, a body that nothing holds has no equilibrium.
     fn explained(
         &self,
@@ -117,15 +107,42 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         if let Some(sentence) = self.bodies.iter().find_map(|body| body.law.last_failure()) {
             return StepError::LawFailed { sentence, source: error };
         }
-        if !equilibrium.step.nodal.is_static() || matches!(error.cause, NewtonFailure::Stopped) {
+        if matches!(error.cause, NewtonFailure::Stopped) {
             return StepError::Newton(error);
         }
+        let is_static = equilibrium.step.nodal.is_static();
         // Contact may hold the bodies, and a shorter step may find it.
-        let free = !self.loads.contacts.exist();
-        match loose(&self.grid, equilibrium, supports.active()).filter(|_| free) {
-            Some(loose) => StepError::Loose { loose, source: error },
-            None => StepError::Unbalanced { source: error },
+        let free = is_static && !self.loads.contacts.exist();
+        if let Some(loose) = free.then(|| loose(&self.grid, equilibrium, supports.active())).flatten() {
+            return StepError::Loose { loose, source: error };
         }
+        match self.advice(is_static) {
+            Some(advice) => StepError::Unbalanced { advice, source: error },
+            None => StepError::Newton(error),
+        }
+    }
+
+    /// What to do where no equilibrium is found.
+    fn advice(&self, is_static: bool) -> Option<String> {
+        let path = if self.loads.contacts.exist() { "" } else { "follow the path (time.scheme = \"arc_length\"), " };
+        let load = format!(
+            "without inertia there may be none, where a load is larger than the bodies bear: prescribe the motion there, {path}or give the \
+             scene inertia"
+        );
+        let outside = |body: &&Body<L>| {
+            let law = body.law.shipped().and_then(|law| law.downcast_ref::<Material>());
+            law.is_some_and(|law| matches!(law, Material::Foreign(_)))
+        };
+        let law = |body: &Body<L>| {
+            format!(
+                "the law of body {:?} comes from a library, and Newton's method does not converge with a wrong tangent: `bfree check-law` \
+                 tells whether it is right",
+                body.name
+            )
+        };
+        let law = self.bodies.iter().find(outside).map(law);
+        let all: Vec<String> = is_static.then_some(load).into_iter().chain(law).collect();
+        (!all.is_empty()).then(|| all.join("; "))
     }
 
     /// Compares the tangent at the solution with dual numbers, if the settings ask for it. The direction differs from step to step.

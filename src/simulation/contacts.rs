@@ -5,14 +5,16 @@ use super::work::halfway;
 use super::{Simulation, StepError};
 use crate::approximation::ShapeFunction;
 use crate::material::Law;
-use crate::mechanics::contact::{Carrier, ContactPoint, FreeMotion, Response, Surroundings, Touching, obstacle_points};
-use crate::mechanics::facing::facing;
-use crate::mechanics::loads::{Contacts, Facing, Obstacle, Pose, RigidBody};
+use crate::mechanics::contact::{
+    Carrier, ContactPoint, FreeMotion, Surroundings, Touching, candidates, obstacle_points,
+};
+use crate::mechanics::loads::{Candidate, Contacts, Obstacle, Pose, RigidBody, SurfacePoint};
 use crate::mechanics::schemes::Alphas;
+use crate::mechanics::sweep::Supports;
 use crate::mechanics::terms::{ContactForce, Step, penalties};
 use crate::tensor::Vector;
 use nalgebra::Vector3;
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 
 /// The contact of all bodies with one obstacle, or of a pair of bodies, at the end of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,10 +41,12 @@ pub(super) struct ContactUpdate<const D: usize> {
     pub pairs: Vec<ContactForces<D>>,
     /// The new anchors of friction, by obstacle.
     anchors: Vec<Vec<Vector<f64, D>>>,
-    /// The new slips between bodies, by point.
-    slips: Vec<Vector<f64, D>>,
+    /// The new slips between bodies, by point and pair.
+    slips: BTreeMap<[usize; 2], Vector<f64, D>>,
     /// The energy stored in the contact between bodies.
     energy: f64,
+    /// The work that friction takes in the step, by obstacle and by pair. A part of it is stored by elastic slip.
+    taken: [Vec<f64>; 2],
     /// The new state of every obstacle that moves freely.
     free: Vec<Option<RigidBody<D>>>,
     /// The work of all obstacles in the step.
@@ -65,9 +69,15 @@ impl<const D: usize> ContactForces<D> {
 
 impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// Finds the points that may touch another body in the coming step.
-    pub(super) fn find_facing(&mut self) {
+    pub(super) fn find_candidates(&mut self, supports: &Supports<D>) {
         let Some(mut between) = self.loads.contacts.between.take() else { return };
-        between.facing = facing(&self.loads.contacts, &between, &self.particles, &self.grid, self.clock.step());
+        let (dt, rate, velocity) = (self.clock.step(), &self.history.rate, &self.particles.velocity);
+        let motion = |p: usize| match (velocity.get(p), rate.is_empty()) {
+            (Some(v), _) => v * dt,
+            (None, false) => supports.value_at(p, rate) * dt,
+            (None, true) => Vector::zeros(),
+        };
+        between.candidates = candidates(&self.loads.contacts, &between, &self.particles, &self.grid, motion);
         self.loads.contacts.between = Some(between);
     }
 
@@ -92,24 +102,27 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let end = Step { time: self.load() + self.clock.step(), alphas, ..*step };
         let motion = Motion {
             poses: [self.poses(self.load()), poses],
-            positions: self.point_positions(step, phi),
+            positions: self.end_positions(step, phi),
             relative: self.relative_motions(step, phi),
         };
         self.check_paths(&motion)?;
         let mut update = ContactUpdate { free, ..self.untouched(&motion) };
         let at_end = points_at(&end, phi, &motion.poses[1]);
         at_end.iter().for_each(|one| update.add_end(one, contacts, &motion));
+        self.check_particles(&motion, [&update.obstacles, &update.pairs])?;
+        let at_start = points_at(&Step { time: self.load(), ..end }, before, &motion.poses[0]);
+        at_start.iter().for_each(|one| update.add_start(one));
         let mut work = |share, points: &[ContactPoint<f64, D>]| {
             points.iter().for_each(|one| update.add_work(share, one, &motion, &self.ends(one, &motion.positions)));
         };
         if step.alphas.discrete_gradient {
             work(1.0, &points_at(step, &halfway(before, phi), &self.poses(step.time)));
-            return Ok(update);
+        } else {
+            work(0.5, &at_end);
+            mutant!("obstacles: the forces at the start of a step do no work": at_start = Vec::new());
+            work(0.5, &at_start);
         }
-        work(0.5, &at_end);
-        let start = Step { time: self.load(), ..end };
-        mutant!("obstacles: the forces at the start of a step do no work": { return Ok(update); });
-        work(0.5, &points_at(&start, before, &motion.poses[0]));
+        update.dissipate();
         Ok(update)
     }
 
@@ -125,7 +138,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         phi: &[Vector<f64, D>],
     ) -> Result<Vec<Option<RigidBody<D>>>, StepError> {
         let (contacts, scheme) = (&self.loads.contacts, &self.settings.scheme);
-        let force = ContactForce::pressure(step).filter(|_| contacts.has_free_obstacle());
+        let force = ContactForce::of(step).filter(|_| contacts.has_free_obstacle());
         let Some(force) = force else { return Ok(vec![None; contacts.obstacles.len()]) };
         let (theta, end) = (scheme.instant(), scheme.end(self.clock.step()));
         let balanced: Vec<_> = before.iter().zip(phi).map(|(before, phi)| before + (phi - before) * theta).collect();
@@ -150,38 +163,38 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let contacts = &self.loads.contacts;
         let since = |work, friction_loss| ContactForces { work, friction_loss, ..ContactForces::NONE };
         let pairs = contacts.between.iter().flat_map(|between| &between.pairs);
-        let slips = contacts.between.as_ref().map_or(0, |between| between.slips.len());
         let anchors = contacts.obstacles.iter().zip(&motion.poses[1]);
         ContactUpdate {
             obstacles: contacts.obstacles.iter().map(|one| since(one.work, one.friction_loss)).collect(),
+            taken: [vec![0.0; contacts.obstacles.len()], vec![0.0; pairs.clone().count()]],
             pairs: pairs.map(|pair| since(0.0, pair.friction_loss)).collect(),
-            anchors: anchors.map(|(one, pose)| free_anchors(one, pose, &motion.positions)).collect(),
-            slips: vec![Vector::zeros(); slips],
+            anchors: anchors.map(|(one, pose)| free_anchors(one, pose, &contacts.points, &motion.positions)).collect(),
             ..ContactUpdate::default()
         }
     }
 
-    /// For each facing point, its motion in the step relative to the other body: the positions at both ends.
-    fn relative_motions(&self, step: &Step<'_, D, L>, phi: &[Vector<f64, D>]) -> HashMap<usize, [Vector<f64, D>; 2]> {
+    /// The position of each candidate relative to the other body, at both ends of the step.
+    fn relative_motions(&self, step: &Step<'_, D, L>, phi: &[Vector<f64, D>]) -> Vec<[Vector<f64, D>; 2]> {
         let (contacts, reference) = (&self.loads.contacts, self.particles.reference().position);
-        let facing = contacts.between.iter().flat_map(|between| &between.facing);
-        let of = |one: &Facing<D>| {
+        let candidates = contacts.between.iter().flat_map(|between| &between.candidates);
+        let of = |one: &Candidate<D>| {
             let position = |carrier: &Carrier<D>| carrier.position(reference, step.supports, phi) * carrier.share;
-            (one.number, [one.start, one.carriers(contacts).iter().map(position).sum()])
+            [one.start, one.carriers(contacts).iter().map(position).sum()]
         };
-        facing.map(of).collect()
+        candidates.map(of).collect()
     }
 
-    /// The positions of all points at the end of the step.
-    fn point_positions(&self, step: &Step<'_, D, L>, phi: &[Vector<f64, D>]) -> Vec<Vector<f64, D>> {
-        let reference = self.particles.reference().position;
-        let at = |p: usize| reference[p] + step.supports.value_at(p, phi);
-        self.loads.contacts.points.iter().map(|point| at(point.particle)).collect()
+    /// The positions of all particles at the end of the step.
+    fn end_positions(&self, step: &Step<'_, D, L>, phi: &[Vector<f64, D>]) -> Vec<Vector<f64, D>> {
+        let mut positions = self.particles.reference().position.to_vec();
+        step.supports.each_value(phi, |p, u| positions[p] += u);
+        positions
     }
 
     /// The positions of a point at both ends of the step.
     fn ends(&self, one: &ContactPoint<f64, D>, positions: &[Vector<f64, D>]) -> [Vector<f64, D>; 2] {
-        [self.particles.position[one.carriers[0].particle], positions[one.number]]
+        let p = one.carriers[0].particle;
+        [self.particles.position[p], positions[p]]
     }
 
     /// The poses of all obstacles at a time.
@@ -207,19 +220,18 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         }
     }
 
-    /// The energy stored in the contact with obstacles and between bodies: Σ ½ k g² A.
+    /// The energy stored in the contact with obstacles and between bodies: Σ ½ k (g² + |s|²) A with the elastic slip s.
     pub fn contact_energy(&self) -> f64 {
         let (particles, penalties) = (&self.particles, penalties(&self.bodies, self.grid.spacing));
         let around = Surroundings {
             t: self.load(),
             start: None,
-            spacing: self.grid.spacing,
             stiffness: |p: usize| penalties[particles.body[p] as usize],
             position: |carrier: &Carrier<D>| particles.position[carrier.particle],
         };
         let touching = obstacle_points(&self.loads.contacts, &around, &self.poses(self.load()));
         let between = self.loads.contacts.between.as_ref().map_or(0.0, |between| between.energy);
-        touching.iter().fold(between, |sum, one| sum + one.law.energy(&one.y) * one.area)
+        touching.iter().fold(between, |sum, one| sum + one.stored())
     }
 }
 
@@ -227,10 +239,10 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
 pub(super) struct Motion<const D: usize> {
     /// The poses of all obstacles at both ends.
     pub poses: [Vec<Pose<D>>; 2],
-    /// The positions of all points at the end.
+    /// The positions of all particles at the end.
     pub positions: Vec<Vector<f64, D>>,
-    /// The positions of facing points relative to the other body, at both ends.
-    pub relative: HashMap<usize, [Vector<f64, D>; 2]>,
+    /// The positions of all candidates relative to the other body, at both ends.
+    pub relative: Vec<[Vector<f64, D>; 2]>,
 }
 
 impl<const D: usize> ContactUpdate<D> {
@@ -246,22 +258,41 @@ impl<const D: usize> ContactUpdate<D> {
                 let arm = pose.rotation * (y - middle(&contacts.obstacles[obstacle]));
                 (&mut self.obstacles[obstacle], arm, -force)
             }
-            Touching::Pair { pair, is_first } => {
-                if let Some(slip) = self.slips.get_mut(*number) {
-                    *slip = law.along(&(y - law.new_anchor(y)));
+            Touching::Pair { pair, is_first, .. } => {
+                if law.has_friction() {
+                    self.slips.insert([*number, pair], law.elastic_slip(y));
                 }
-                self.energy += law.energy(y) * area;
-                (&mut self.pairs[pair], motion.positions[*number], if is_first { -force } else { force })
+                self.energy += one.stored();
+                (
+                    &mut self.pairs[pair],
+                    motion.positions[one.carriers[0].particle],
+                    if is_first { -force } else { force },
+                )
             }
         };
         contact.force += on_other;
         contact.moment = add(contact.moment, moment(&arm, &on_other));
         contact.area += area;
         contact.depth = contact.depth.max(law.depth(y));
+        *self.taken(*touching) -= law.slip_energy(y) * area;
+    }
+
+    /// Adds the energy that elastic slip has stored at the start of the step.
+    fn add_start(&mut self, one: &ContactPoint<f64, D>) {
+        *self.taken(one.touching) += one.law.slip_energy(&one.y) * one.area;
+    }
+
+    /// The work that friction takes at a contact.
+    fn taken(&mut self, touching: Touching) -> &mut f64 {
+        let [obstacles, pairs] = &mut self.taken;
+        match touching {
+            Touching::Obstacle(obstacle) => &mut obstacles[obstacle],
+            Touching::Pair { pair, .. } => &mut pairs[pair],
+        }
     }
 
     /// Adds a share of the work of a force in the step: a half for the force at each end, or all for the force in the middle. The point moves
-    /// between its `positions` at both ends. Friction loses the work along the motion of the point relative to the obstacle or to the other
+    /// between its `positions` at both ends. Friction takes the work along the motion of the point relative to the obstacle or to the other
     /// body.
     fn add_work(
         &mut self,
@@ -270,25 +301,29 @@ impl<const D: usize> ContactUpdate<D> {
         motion: &Motion<D>,
         positions: &[Vector<f64, D>; 2],
     ) {
-        let friction = one.law.traction(Response::Friction, &one.y) * one.area;
-        let (contact, relative, work) = match one.touching {
+        let relative = match one.touching {
             Touching::Obstacle(obstacle) => {
                 let [start, end] = [&motion.poses[0][obstacle], &motion.poses[1][obstacle]];
-                let moved = end.to_space(&one.y) - start.to_space(&one.y);
-                let relative = end.to_frame(&positions[1]) - start.to_frame(&positions[0]);
-                (&mut self.obstacles[obstacle], relative, share * one.force().dot(&moved))
+                let work = share * one.force().dot(&(end.to_space(&one.y) - start.to_space(&one.y)));
+                self.obstacles[obstacle].work += work;
+                self.work += work;
+                end.to_frame(&positions[1]) - start.to_frame(&positions[0])
             }
-            Touching::Pair { pair, .. } => {
-                let [start, end] = motion.relative[&one.number];
-                (&mut self.pairs[pair], end - start, 0.0)
-            }
+            Touching::Pair { candidate, .. } => motion.relative[candidate][1] - motion.relative[candidate][0],
         };
-        let loss = -share * friction.dot(&relative);
-        mutant!("obstacles: friction loses nothing": loss = 0.0);
-        contact.work += work;
-        self.work += work;
-        contact.friction_loss += loss;
-        self.friction_loss += loss;
+        *self.taken(one.touching) -= share * one.area * one.law.friction(&one.y).dot(&relative);
+    }
+
+    /// Adds the energy that friction dissipates in the step: its work without the part that elastic slip stores. The law dissipates nowhere less
+    /// than nothing, and neither do the sums, whose error is that of the trapezoidal rule.
+    fn dissipate(&mut self) {
+        let contacts = self.obstacles.iter_mut().chain(&mut self.pairs);
+        for (contact, taken) in contacts.zip(self.taken.iter().flatten()) {
+            let loss = taken.max(0.0);
+            mutant!("obstacles: friction loses nothing": loss = 0.0);
+            contact.friction_loss += loss;
+            self.friction_loss += loss;
+        }
     }
 }
 
@@ -299,16 +334,18 @@ fn points_at<const D: usize, L: Law>(
     poses: &[Pose<D>],
 ) -> Vec<ContactPoint<f64, D>> {
     let step = Step { poses: Some(poses), ..*step };
-    ContactForce::pressure(&step).map_or_else(Vec::new, |force| force.contact_points(phi))
+    ContactForce::of(&step).map_or_else(Vec::new, |force| force.contact_points(phi))
 }
 
 /// The anchors of points that touch nothing: their positions.
 fn free_anchors<const D: usize>(
     obstacle: &Obstacle<D>,
     pose: &Pose<D>,
+    points: &[SurfacePoint<D>],
     positions: &[Vector<f64, D>],
 ) -> Vec<Vector<f64, D>> {
-    if obstacle.friction > 0.0 { positions.iter().map(|x| pose.to_frame(x)).collect() } else { Vec::new() }
+    let at = |point: &SurfacePoint<D>| pose.to_frame(&positions[point.particle]);
+    if obstacle.friction > 0.0 { points.iter().map(at).collect() } else { Vec::new() }
 }
 
 /// The place that moments on an obstacle are about, in its frame: the centre of mass of a free obstacle, else the middle of its bounding box,

@@ -1,17 +1,20 @@
 //! Steps that are refused because a surface enters an obstacle or another body too deeply, or goes through it.
 
 use super::contacts::Motion;
-use super::{Simulation, StepError};
+use super::{BareParticle, ContactForces, Simulation, StepError};
 use crate::approximation::ShapeFunction;
 use crate::material::Law;
-use crate::mechanics::facing::{DEEPEST, Overlap, REACH, overlaps};
-use crate::mechanics::loads::{Facing, Pose};
+use crate::mechanics::contact::{FASTEST, Path, paths, swallowed};
+use crate::mechanics::loads::Pose;
 use crate::shape::Shape;
 use crate::tensor::Vector;
-use std::collections::HashMap;
+use std::collections::HashSet;
 
 /// A point may enter an obstacle or another body in one step by this many spacings at most. A longer step is repeated with half its length.
 const DEEPEST_ENTRY: f64 = 0.25;
+
+/// A particle that lies deeper in an obstacle or another body than all points of surfaces, by this many spacings, becomes a point of the surface.
+const DEEPER: f64 = 0.01;
 
 /// The path of a point in a step is tested for obstacles at places this far apart, in spacings, and at this many places at most.
 const SAMPLED: f64 = 0.05;
@@ -29,8 +32,8 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     fn check_entry(&self, Motion { poses, positions, .. }: &Motion<D>) -> Result<(), StepError> {
         let (contacts, h) = (&self.loads.contacts, self.grid.spacing);
         mutant!("obstacles: a point may enter deeply in one step": { return Ok(()); });
-        for (point, end) in contacts.points.iter().zip(positions) {
-            let start = &self.particles.position[point.particle];
+        for point in &contacts.points {
+            let (start, end) = (&self.particles.position[point.particle], &positions[point.particle]);
             for (number, obstacle) in contacts.obstacles.iter().enumerate() {
                 let ends = [poses[0][number].to_frame(start), poses[1][number].to_frame(end)];
                 if let Some(depth) = entry(&obstacle.shape, &ends, h) {
@@ -47,29 +50,21 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let contacts = &self.loads.contacts;
         let Some(between) = &contacts.between else { return Ok(()) };
         let h = self.grid.spacing;
-        let body_of = |number: usize| self.particles.body[contacts.points[number].particle];
-        let start = |number: usize| self.particles.position[contacts.points[number].particle];
+        let particle = |number: usize| contacts.points[number].particle;
+        let body_of = |number: usize| self.particles.body[particle(number)];
+        let start = |number: usize| self.particles.position[particle(number)];
         let refused = |number: usize, pair: usize, depth: f64| {
             let own = body_of(number);
             let other = between.pairs[pair].bodies.into_iter().find(|&body| body != own).unwrap_or(own);
             let names = [own, other].map(|body| self.bodies[body as usize].name.clone());
             StepError::EntersBody { bodies: names, position: start(number).iter().copied().collect(), depth }
         };
-        let depth = |one: &Facing<D>, relative: &Vector<f64, D>| -one.normal.dot(relative) / h;
-        let before: HashMap<usize, f64> =
-            between.facing.iter().map(|one| (one.number, depth(one, &one.start).max(0.0))).collect();
-        let known = between.facing.iter().map(|one| {
-            let depth = depth(one, &motion.relative[&one.number][1]);
-            (one.number, one.pair, depth)
-        });
-        // A point may have come around an edge, or along a curved surface.
-        let ends = overlaps(contacts, between, &self.particles, &self.grid, &motion.positions);
-        mutant!("contact: a point that did not face a body may enter it": ends = Vec::new());
-        let new = ends.iter().map(|&Overlap { number, pair, depth }| (number, pair, depth / h));
-        for (number, pair, depth) in known.chain(new) {
-            let entered = depth - before.get(&number).copied().unwrap_or(0.0);
-            if depth > DEEPEST || entered > DEEPEST_ENTRY {
-                return Err(refused(number, pair, depth));
+        let ends = |number: usize| [start(number), motion.positions[particle(number)]];
+        let paths = paths(contacts, between, &self.particles, &self.grid, ends);
+        mutant!("contact: a point that did not face a body may enter it": paths = Vec::new());
+        for Path { number, pair, depth: [before, after], deepest } in paths {
+            if after > deepest || after - before.max(0.0) > DEEPEST_ENTRY * h {
+                return Err(refused(number, pair, after / h));
             }
         }
         // The search has seen what is within its reach, so nothing may come from farther away.
@@ -78,9 +73,9 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             let [Some(one), Some(other)] = pair.bodies.map(|body| boxes[body as usize]) else { continue };
             let meet = (0..D).all(|k| one.low[k] <= other.high[k] && other.low[k] <= one.high[k]);
             let apart = one.motion - other.motion;
-            if meet && apart.norm() + one.spread + other.spread > f64::from(REACH) * h {
+            if meet && apart.norm() + one.spread + other.spread > FASTEST * h {
                 let bodies = pair.bodies.map(|body| self.bodies[body as usize].name.clone());
-                return Err(StepError::PassesBody { bodies, reach: REACH });
+                return Err(StepError::PassesBody { bodies, fastest: FASTEST });
             }
         }
         Ok(())
@@ -89,8 +84,8 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// The boxes through which the surfaces of all bodies move in the step; `None` for a body without surface points.
     fn boxes(&self, positions: &[Vector<f64, D>]) -> Vec<Option<Swept<D>>> {
         let mut boxes: Vec<Option<Swept<D>>> = vec![None; self.bodies.len()];
-        for (point, end) in self.loads.contacts.points.iter().zip(positions) {
-            let start = &self.particles.position[point.particle];
+        for point in &self.loads.contacts.points {
+            let (start, end) = (&self.particles.position[point.particle], &positions[point.particle]);
             let (low, high, motion) = (start.inf(end), start.sup(end), end - start);
             let swept = boxes[self.particles.body[point.particle] as usize];
             let new = Swept { low, high, motion, spread: 0.0 };
@@ -102,6 +97,46 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             }));
         }
         boxes
+    }
+
+    /// Refuses a step after which particles lie deeper in an obstacle or in another body than all points of surfaces: the surface has opened
+    /// there.
+    pub(super) fn check_particles(
+        &self,
+        Motion { poses: [_, poses], positions, .. }: &Motion<D>,
+        [obstacles, pairs]: [&[ContactForces<D>]; 2],
+    ) -> Result<(), StepError> {
+        let (contacts, particles) = (&self.loads.contacts, &self.particles);
+        let margin = DEEPER * self.grid.spacing;
+        let covered: HashSet<usize> = contacts.points.iter().map(|point| point.particle).collect();
+        let mut bare: Vec<BareParticle> = Vec::new();
+        let mut add = |p: usize, outward: Vector<f64, D>| {
+            if covered.contains(&p) {
+                return;
+            }
+            bare.push(BareParticle { particle: particles.id[p], outward: outward.iter().copied().collect() });
+        };
+        mutant!("contact: particles do not watch": { return Ok(()); });
+        for ((obstacle, pose), contact) in contacts.obstacles.iter().zip(poses).zip(obstacles) {
+            let (low, high) = obstacle.shape.bounding_box();
+            for p in (0..particles.len()).filter(|&p| particles.is_solid(p)) {
+                let y = pose.to_frame(&positions[p]);
+                if (0..D).all(|k| low[k] < y[k] && y[k] < high[k]) {
+                    let (distance, normal) = obstacle.shape.distance_and_normal(&y);
+                    if -distance > contact.depth + margin {
+                        add(p, pose.rotation * -normal);
+                    }
+                }
+            }
+        }
+        if let Some(between) = &contacts.between {
+            for (p, pair, depth, normal) in swallowed(contacts, between, particles, &self.grid, positions) {
+                if depth > pairs[pair].depth + margin {
+                    add(p, -normal);
+                }
+            }
+        }
+        if bare.is_empty() { Ok(()) } else { Err(StepError::SurfaceOpens { bare }) }
     }
 
     /// Refuses a step in which a free obstacle and another one enter each other, or go through each other: obstacles do not push each other.

@@ -105,7 +105,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             self.particles.reference = None;
             if !self.settings.scheme.has_inertia() {
                 let touching = self.bodies_touch(supports);
-                let last = LastEquilibrium::new(&self.loads, accounts.reactions.clone(), touching, field_positions);
+                let last = LastEquilibrium::new(&self.loads, accounts.by_field.clone(), touching, field_positions);
                 self.history.equilibrium = Some(last);
             }
         }
@@ -133,7 +133,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// Whether a body has reached a wall, or in load steps another body. With inertia, also whether a body still feels a wall or touches
     /// another body: without a grid reset, it would never leave.
     fn in_contact(&mut self, supports: &Supports<D>, prescribed: &[PrescribedDof]) -> bool {
-        let reached = reached_conditions(&self.particles, &self.loads.prescribed, &self.grid, supports.active());
+        let reached = reached_conditions(&self.particles, &self.loads.prescribed, supports);
         self.history.constrained.retain(|one| !reached.contains(one));
         if !reached.is_empty() {
             return true;
@@ -155,7 +155,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let Some(last) = self.history.equilibrium.as_ref().filter(|_| nodal.is_static()) else {
             return Ok(Pooled::default());
         };
-        if last.lost_support(prescribed) || last.touching && !self.bodies_touch(supports) {
+        if last.lost_support(supports, prescribed) || last.touching && !self.bodies_touch(supports) {
             return Ok(Pooled::default());
         }
         last.out_of_balance(self.equilibrium(supports, nodal, prescribed, Alphas::START, self.load()).step, prescribed)

@@ -3,9 +3,11 @@
 mod balance;
 mod contacts;
 mod entry;
+mod first_guess;
 mod history;
 mod next_step;
 mod preconditioner;
+mod refinement;
 mod report;
 mod settings;
 mod start;
@@ -17,7 +19,7 @@ pub use crate::mechanics::loads::Reaction;
 pub use contacts::ContactForces;
 pub use history::History;
 pub use next_step::NextStep;
-pub use report::{AdvanceError, FailedAttempt, StepError, StepReport};
+pub use report::{AdvanceError, BareParticle, FailedAttempt, StepError, StepReport};
 pub use settings::{InitialGuess, Settings};
 pub use touching::Sharing;
 
@@ -300,6 +302,9 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     pub fn strain_energy(&self) -> f64 {
         let particles = &self.particles;
         let energy = |p: usize| {
+            if !particles.is_solid(p) {
+                return 0.0;
+            }
             let at = particles.state(p, 0.0);
             let body = &self.bodies[particles.body[p] as usize];
             let [more, _] = body.averaged(particles.dilatation(p), at.j);

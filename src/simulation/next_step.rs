@@ -45,6 +45,7 @@ impl<const D: usize, L: Law + Clone, A: ShapeFunction + Clone> Simulation<D, L, 
         let mut simulation = Self { workspace: Workspace::default(), ..self.clone() };
         simulation.particles.make_room_for_internal(&simulation.bodies);
         let supports = simulation.new_supports(None)?;
+        simulation.find_candidates(&supports);
         let prescribed = self.prescribed(supports.active());
         let nodal = simulation.nodal(&supports, &prescribed)?.with_prescribed(&prescribed);
         let nodal = nodal.extended(&Unknowns::new(&supports, &prescribed));

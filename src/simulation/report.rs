@@ -87,7 +87,7 @@ impl FailedAttempt {
         let newton = match error {
             StepError::Newton(source)
             | StepError::LawFailed { source, .. }
-            | StepError::Unbalanced { source }
+            | StepError::Unbalanced { source, .. }
             | StepError::Loose { source, .. } => (*source.history).clone(),
             StepError::Inaccurate { newton, .. } => (**newton).clone(),
             _ => NewtonHistory::default(),
@@ -96,6 +96,15 @@ impl FailedAttempt {
         let Spent { watch: seconds, projection_iterations } = spent;
         Self { dt, inaccurate, why: causes::on_one_line(error), projection_iterations, newton, seconds }
     }
+}
+
+/// A particle that no surface covers any more.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BareParticle {
+    /// Id of the particle.
+    pub particle: u32,
+    /// The outward normal of the new surface.
+    pub outward: Vec<f64>,
 }
 
 /// Errors of a step. The particles are unchanged.
@@ -110,12 +119,11 @@ pub enum StepError {
     /// Newton's method found no equilibrium.
     #[error("no equilibrium was found")]
     Newton(#[from] NewtonError<Inadmissible>),
-    /// Without inertia, Newton's method found no equilibrium.
-    #[error(
-        "no equilibrium was found; without inertia there may be none, where a load is larger than the bodies bear: prescribe the \
-         motion there, follow the path (time.scheme = \"arc_length\"), or give the scene inertia"
-    )]
+    /// Newton's method found no equilibrium, without inertia or with a law from a library.
+    #[error("no equilibrium was found; {advice}")]
     Unbalanced {
+        /// What may be the cause, and what to do.
+        advice: String,
         /// The error of Newton's method.
         source: NewtonError<Inadmissible>,
     },
@@ -208,15 +216,15 @@ pub enum StepError {
     },
     /// Two bodies move so fast that contact may be missed.
     #[error(
-        "bodies {:?} and {:?} are near each other, and points of them move by more than {reach} grid spacings relative to each other in one \
-         step, so that contact may be missed: take shorter steps",
+        "bodies {:?} and {:?} are near each other, and points of them move by more than {fastest} grid spacings relative to each other in \
+         one step, so that contact may be missed: take shorter steps",
         bodies[0], bodies[1]
     )]
     PassesBody {
         /// Names of the bodies.
         bodies: [String; 2],
-        /// The reach of the search for contact, in grid spacings.
-        reach: u32,
+        /// The largest motion in which no contact is missed, in grid spacings.
+        fastest: f64,
     },
     /// A point of a body enters another body too deeply.
     #[error(
@@ -232,6 +240,16 @@ pub enum StepError {
         /// Depth at the end of the step, in grid spacings.
         depth: f64,
     },
+    /// Particles lie deeper in an obstacle or in another body than the surface of their own body.
+    #[error(
+        "particle {} lies deeper in an obstacle or in another body than the surface of its own body, and so do {} others: the surface has \
+         opened there. Simulation::advance makes these particles points of the surface, and repeats the step",
+        bare[0].particle, bare.len() - 1
+    )]
+    SurfaceOpens {
+        /// The particles; at least one.
+        bare: Vec<BareParticle>,
+    },
     /// A particle would leave the grid.
     #[error(
         "particle {particle} leaves the grid at {position:?}; enlarge the grid or hold the body with a boundary condition"
@@ -241,6 +259,14 @@ pub enum StepError {
         particle: usize,
         /// Position that the particle would reach.
         position: Vec<f64>,
+    },
+    /// The energy or an internal variable of a particle is no number.
+    #[error(
+        "particle {particle} would have an energy, or an internal variable, that is not finite: take a shorter step or a stiffer body"
+    )]
+    Undefined {
+        /// Id of the particle.
+        particle: usize,
     },
 }
 

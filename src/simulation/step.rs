@@ -39,10 +39,10 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// A step like [`Self::step`]. `spent` counts the work, also if the step fails.
     fn attempt(&mut self, spent: &mut Spent) -> Result<StepReport<D>, StepError> {
         self.particles.make_room_for_internal(&self.bodies);
-        self.find_facing();
         let (dt, scheme, watch) = (self.clock.step(), self.settings.scheme.clone(), &mut spent.watch);
 
         let supports = self.supports()?;
+        self.find_candidates(&supports);
         let nodes = supports.active().clone();
         let prescribed = self.prescribed(&nodes);
         watch.lap(Phase::ShapeFunctions, supports.passes());
@@ -102,7 +102,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// Smooths the update, if the settings ask for it.
     ///
     /// # Errors
-    /// A particle leaves the grid.
+    /// A particle leaves the grid, or has no state that is a number.
     fn smooth_and_check(
         &self,
         update: &mut Update<'_, D>,
@@ -112,16 +112,17 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         if let Some(smoothing) = &self.settings.smoothing {
             update.smooth(smoothing, &self.particles, supports, &nodal.mass, self.clock.step());
         }
-        match update.leaving(&self.particles, supports, &self.grid) {
+        if let Some((particle, position)) = update.leaving(&self.particles, supports, &self.grid) {
+            return Err(StepError::LeftGrid { particle, position: position.iter().copied().collect() });
+        }
+        match update.remember(&self.particles, &self.bodies, supports, self.clock.step()) {
             None => Ok(()),
-            Some((particle, position)) => {
-                Err(StepError::LeftGrid { particle, position: position.iter().copied().collect() })
-            }
+            Some(particle) => Err(StepError::Undefined { particle }),
         }
     }
 
     /// Stores the shape functions for the next step, or their memory alone if it cannot use them. Reorders the particles if passes over the
-    /// particles leap too often in memory.
+    /// particles leap too often in memory. Refines surfaces that have stretched, because a new grid is the time for it.
     fn store_supports(&mut self, supports: Supports<D>) {
         let order = supports.leaping();
         if let Some(order) = &order {
@@ -129,6 +130,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         }
         self.workspace.supports_are_valid = !self.history.resets_grid() && order.is_none();
         self.workspace.supports = Some(if order.is_some() { supports.rearranged() } else { supports });
+        self.refine_surfaces(self.load() + self.clock.step());
     }
 
     /// Whether the next step may be twice as long.
@@ -188,6 +190,11 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
                 Err(cause) => cause,
             };
             failed.push(FailedAttempt::new(dt, spent, &cause));
+            if let StepError::SurfaceOpens { bare } = &cause
+                && self.cover(bare)
+            {
+                continue;
+            }
             let mended = match cause {
                 ref stopped if stopped.is_stopped() => false,
                 StepError::Newton(_)
@@ -197,6 +204,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
                 | StepError::EntersBody { .. }
                 | StepError::FreeObstacle { .. }
                 | StepError::PassesBody { .. }
+                | StepError::Undefined { .. }
                 | StepError::Inaccurate { .. } => true,
                 // The step may be too long to meet a wall, an obstacle or another body.
                 StepError::LeftGrid { .. } => self.settings.error_tolerance.is_some() || self.loads.contacts.exist(),

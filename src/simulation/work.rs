@@ -15,6 +15,8 @@ use crate::tensor::Vector;
 /// Forces, work and losses of a step.
 pub(super) struct Accounts<const D: usize> {
     pub reactions: Vec<Reaction<D>>,
+    /// The reactions on the bodies of each nodal field: those of the first condition, then those of the second one, and so on.
+    pub by_field: Vec<Reaction<D>>,
     /// The work of loads, of moving walls and of moving obstacles.
     pub work: f64,
     /// The energy dissipated by damping and by friction.
@@ -50,7 +52,8 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             end = &after;
         }
         let is_mean = balanced.step.alphas.discrete_gradient;
-        let (reactions, mut work) = self.reactions(end, update, is_mean)?;
+        let (by_field, mut work) = self.reactions(end, update, is_mean)?;
+        let reactions = by_field.chunks(supports.field_count() as usize).map(Reaction::sum).collect();
         // At t_n: a = a_n and Δφ = 0.
         let start = self.equilibrium(supports, nodal, end.prescribed, Alphas::START, t);
         let middle = if is_mean { halfway(&before, phi) } else { Vec::new() };
@@ -73,10 +76,10 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let dissipated = if self.loads.damping.is_some() { work_of(Role::Dissipates)? } else { 0.0 };
         let contacts = self.contact_update(&balanced.step, [&before, phi], free, poses)?;
         let (work, dissipated) = (work + contacts.work, dissipated + contacts.friction_loss);
-        Ok(Accounts { reactions, work, dissipated, contacts })
+        Ok(Accounts { reactions, by_field, work, dissipated, contacts })
     }
 
-    /// The reactions at the end of a step, and their part of the work of moving walls: half of the force, or none of it where forces act in the
+    /// The reactions at the end of a step, by condition and nodal field, and their part of the work of moving walls: half of the force, or none of it where forces act in the
     /// middle, and the whole impulse.
     fn reactions(
         &self,
@@ -86,7 +89,8 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     ) -> Result<(Vec<Reaction<D>>, f64), StepError> {
         let (terms::Step { supports, .. }, phi, dt) = (end.step, update.motion(), self.clock.step());
         let conditions = &self.loads.prescribed;
-        let mut reactions = vec![Reaction { force: Vector::zeros(), torque: 0.0 }; conditions.len()];
+        let fields = supports.field_count() as usize;
+        let mut reactions = vec![Reaction::NONE; conditions.len() * fields];
         let mut work = 0.0;
         if !end.prescribed.is_empty() {
             let mut residual: Pooled<Vector<f64, D>> = supports.field();
@@ -94,10 +98,11 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             for (dof, impulse) in end.prescribed.iter().zip(update.impulses()) {
                 let (reaction, blow) = (residual[dof.node][dof.component], impulse / dt);
                 mutant!("step: reactions and work lack the blow of a wall": blow = 0.0);
-                reactions[dof.owner].force[dof.component] += reaction + blow;
+                let of_field = &mut reactions[dof.owner * fields + supports.field_of_node(dof.node) as usize];
+                of_field.force[dof.component] += reaction + blow;
                 if let Some(rotation) = conditions[dof.owner].rotation() {
                     let x = self.grid.position(self.grid.index(supports.active().ids()[dof.node])) + phi[dof.node];
-                    reactions[dof.owner].torque += rotation.moment(&x, dof.component, reaction + blow);
+                    of_field.torque += rotation.moment(&x, dof.component, reaction + blow);
                 }
                 work += (if is_mean { blow } else { 0.5 * reaction + blow }) * dof.step.increment;
             }

@@ -222,7 +222,8 @@ fn a_body_does_not_pass_another_one_silently() -> Result<(), Failure> {
 #[test]
 fn wrong_contact_between_bodies_is_refused() {
     let text = |changes: &[(&str, Value)]| with(discs(0.0), changes).to_string();
-    let cases: [(&str, Value, &str, &[&str]); 5] = [
+    let cases: [(&str, Value, &str, &[&str]); 6] = [
+        ("/time/scheme", json!("energy_momentum"), "contact", &["energy_momentum", "newmark"]),
         ("/contact", json!({ "friction": -0.1 }), "contact.friction", &["-0.1", "between 0 and 100"]),
         ("/contact", json!({ "stiffness": 0 }), "contact.stiffness", &["finite and > 0"]),
         ("/contact", json!({ "groups": [["one", "too"]] }), "contact.groups[0][1]", &["too", "one, two"]),
@@ -299,6 +300,33 @@ fn load_steps_carry_contact_to_a_new_grid_and_over_a_restart() -> Result<(), Fai
     advance(&mut renewed, 1)?;
     advance(&mut continued, 1)?;
     assert_eq!(continued.particles, renewed.particles);
+    Ok(())
+}
+
+#[test]
+fn every_body_meets_held_nodes_and_walls_whatever_its_place_in_the_list() -> Result<(), Failure> {
+    let block = |name: &str, x: f64, speed: [f64; 2]| {
+        let shape = json!({ "box": { "min": [x, 1.05], "max": [x + 0.5, 1.55] } });
+        merged(solid(name, 1000, shape), json!({ "velocity": speed }))
+    };
+    let (falls, meets_wall) = (block("falls", 0.6, [0.0, -2.0]), block("meets the wall", 2.3, [2.0, 0.0]));
+    let run = |bodies: [&Value; 2]| {
+        let mut simulation: Simulation<2> = built(&json!({
+            "grid": { "size": [3, 2], "spacing": 0.125, "reset": "every_step" },
+            "time": { "step": 0.005, "end": 1 },
+            "bodies": bodies,
+            "boundary": { "right": "sliding" },
+            "prescribed": [{ "region": { "box": { "min": [0, 0], "max": [1.5, 0.5] } }, "displacement": [[0, [0, 0]]] }],
+            "contact": {}
+        }))?;
+        run_to(&mut simulation, 0.4)?;
+        Ok::<_, Failure>([momentum(&simulation, 0), momentum(&simulation, 1)])
+    };
+    let (one, other) = (run([&falls, &meets_wall])?, run([&meets_wall, &falls])?);
+    assert!(one[0][1] > 0.0 && one[1][0] < 0.0, "they bounce off: {one:?}");
+    for (a, b) in [(one[0], other[1]), (one[1], other[0])] {
+        assert!((a - b).norm() < 1e-10 * a.norm(), "{a} {b}");
+    }
     Ok(())
 }
 

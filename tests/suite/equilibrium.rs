@@ -128,7 +128,7 @@ fn truthful<const D: usize>(stress: f64) -> Result<Cloud<D>, Failure> {
 
 /// Follower pressure of p A N = `force` on some particles.
 fn pressures<const D: usize>(particles: &[usize], force: Vector<f64, D>) -> Vec<SurfaceLoad<D>> {
-    let points = particles.iter().map(|&particle| SurfacePoint { particle, normal: force, area: 1.0 });
+    let points = particles.iter().map(|&particle| SurfacePoint::new(particle, force, 1.0));
     vec![SurfaceLoad { pressing: Pressing::Pressure(1.0), curve: Curve::constant(1.0), points: points.collect() }]
 }
 

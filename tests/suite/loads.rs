@@ -139,7 +139,7 @@ fn the_blow_of_walls_that_start_at_once_is_in_their_reactions_and_their_work() -
 #[test]
 fn every_load_follows_its_curve() -> Result<(), Failure> {
     let ramp = Curve::new(vec![[0.0, 0.0], [4.0, 2.0]])?;
-    let point = SurfacePoint { particle: 0, normal: Vector::from([0.6, 0.8]), area: 0.25 };
+    let point = SurfacePoint::new(0, Vector::from([0.6, 0.8]), 0.25);
     let surface = |pressing| SurfaceLoad { pressing, curve: ramp.clone(), points: vec![point] };
     let loads = Loads::<2> {
         gravity: Some(Gravity { acceleration: Vector::from([0.0, -8.0]), curve: ramp.clone() }),

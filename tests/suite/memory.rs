@@ -183,3 +183,46 @@ fn memory_follows_its_particle_wherever_it_lies() -> Result<(), Failure> {
     assert!(one.particles.memory.iter().any(|x| *x > 0.0));
     Ok(())
 }
+
+/// A neo-Hookean solid with an internal variable that is no number once the energy exceeds a limit.
+#[derive(Clone, Copy, Debug)]
+struct Breaks(NeoHookean);
+
+impl Law for Breaks {
+    fn internal_variables(&self) -> &[InternalVariable] {
+        &NAMES[..1]
+    }
+
+    fn energy<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> T {
+        self.0.energy(at)
+    }
+
+    fn stress<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> Tensor<T, D> {
+        self.0.stress(at)
+    }
+
+    fn elasticity<const D: usize>(&self, at: &MaterialState<f64, D>, x: &Tensor<f64, D>) -> Tensor<f64, D> {
+        self.0.elasticity(at, x)
+    }
+
+    fn update_variables<const D: usize>(&self, at: &MaterialState<f64, D>, variables: &mut [f64]) {
+        variables[0] = if self.0.energy(at) > 0.01 * LIMIT { f64::NAN } else { at.dt };
+    }
+}
+
+#[test]
+fn a_state_that_is_no_number_is_refused_and_leaves_the_last_one() -> Result<(), Failure> {
+    let mut simulation = collision(&[])?.with_laws(|body| Breaks(body.law.solid));
+    let mut before = simulation.particles.clone();
+    let error = loop {
+        match simulation.step() {
+            Ok(_) => before = simulation.particles.clone(),
+            Err(error) => break error,
+        }
+        assert!(simulation.clock.steps() < 200, "no step was refused");
+    };
+    assert!(error.to_string().contains("not finite"), "{error}");
+    assert_eq!(simulation.particles, before);
+    assert!(before.memory.iter().all(|one| one.is_finite()));
+    Ok(())
+}

@@ -3,6 +3,7 @@
 
 use crate::support::{Failure, advance, assert_refused, built, in_threads, merged, restored, run_to, solid, with};
 use bfree::simulation::Simulation;
+use bfree::tensor::Vector;
 use serde_json::{Value, json};
 
 /// A square of 4 × 4 cells above the floor y = 0.5, falling and sliding with friction.
@@ -167,6 +168,80 @@ fn a_turned_scene_has_turned_forces() -> Result<(), Failure> {
         let scale = 1e-9 * one.force.norm().max(1.0);
         assert!((one.force[0] - other.force[1]).abs() < scale && (one.force[1] - other.force[0]).abs() < scale);
         assert!((one.area - other.area).abs() < 1e-12);
+    }
+    Ok(())
+}
+
+/// A soft block, 4 × 4 cells large, between smooth plates that press it to 0.3 of its height.
+fn pressed() -> Value {
+    let plate = |name: &str, y: f64, normal: f64, way: f64| {
+        json!({ "name": name, "shape": { "half_space": { "point": [0, y], "normal": [0, normal] } }, "stiffness": 10,
+                "displacement": [[0, [0, 0]], [1, [0, way]]] })
+    };
+    json!({
+        "grid": { "size": [4, 2], "spacing": 0.125, "reset": "every_step" },
+        "time": { "step": 0.01, "end": 1 },
+        "approximation": "linear",
+        "bodies": [solid("block", 1000, json!({ "box": { "min": [1.75, 0.75], "max": [2.25, 1.25] } }))],
+        "obstacles": [plate("lower", 0.75, 1.0, 0.175), plate("upper", 1.25, -1.0, -0.175)]
+    })
+}
+
+#[test]
+fn a_surface_that_stretches_gets_more_points_and_a_restart_has_them() -> Result<(), Failure> {
+    let start: Simulation<2> = built(&pressed())?;
+    let mut simulation = start.clone();
+    run_to(&mut simulation, 0.8)?;
+    let (before, after) = (start.loads.contacts.points.len(), simulation.loads.contacts.points.len());
+    assert!(after > before, "{before} points, {after} after the block is stretched");
+    let mut continued = restored(&simulation, &start)?;
+    advance(&mut simulation, 3)?;
+    advance(&mut continued, 3)?;
+    assert_eq!(continued.particles, simulation.particles);
+    assert_eq!(continued.loads.contacts, simulation.loads.contacts);
+    let particles = &simulation.particles;
+    let below = (0..particles.len()).filter(|&p| (particles.position[p][1] - 1.0).abs() > 0.25);
+    assert_eq!(below.count(), 0, "particles pass the plates");
+    Ok(())
+}
+
+#[test]
+fn a_particle_that_surfaces_leave_bare_becomes_a_part_of_the_surface() -> Result<(), Failure> {
+    let mut simulation: Simulation<2> = built(&falling())?;
+    // The bottom of the square has lost its points.
+    let positions = simulation.particles.position.clone();
+    simulation.loads.contacts.points.retain(|point| positions[point.particle][1] > 0.56);
+    let before = simulation.loads.contacts.points.len();
+    run_to(&mut simulation, 0.3)?;
+    let particles = &simulation.particles;
+    let lowest = particles.position.iter().map(|x| x[1]).fold(f64::INFINITY, f64::min);
+    assert!(simulation.loads.contacts.points.len() > before, "no particle watches");
+    assert!(lowest > 0.5 - 0.1 * 0.125, "a particle lies at {lowest}, and the floor at 0.5");
+    Ok(())
+}
+
+#[test]
+fn a_weight_finds_the_floor_that_holds_it_in_load_steps() -> Result<(), Failure> {
+    // Above the floor, beside a smooth wall of the box, and turned.
+    for (gap, gravity, normal) in
+        [(0.0, [0.0, -10.0], [0, 1]), (0.3, [0.0, -10.0], [0, 1]), (0.2, [10.0, 0.0], [-1, 0])]
+    {
+        let point = [1.5 + gap, 0.5 - gap];
+        let scene = json!({
+            "grid": { "size": [2, 2], "spacing": 0.125 },
+            "time": { "scheme": "none", "step": 0.5, "end": 1 },
+            "bodies": [solid("weight", 1000, json!({ "box": { "min": [0.5, 0.5], "max": [1.5, 1.5] } }))],
+            "gravity": { "acceleration": gravity, "curve": [[0, 0], [1, 1]] },
+            "obstacles": [{ "name": "floor", "shape": { "half_space": { "point": point, "normal": normal } }, "friction": 0.3 }]
+        });
+        let mut simulation: Simulation<2> = built(&scene)?;
+        advance(&mut simulation, 1)?;
+        let force = simulation.advance()?.obstacles[0].force;
+        let weight = Vector::from(gravity);
+        assert!(
+            (force - weight).norm() < 1e-5 * weight.norm(),
+            "gap {gap}: {force} on the floor, and {weight} is the weight"
+        );
     }
     Ok(())
 }

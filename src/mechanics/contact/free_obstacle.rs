@@ -5,7 +5,7 @@
 //!
 //! A change of the places changes q by δq = −(∂r/∂q)⁻¹ Σ ∂r/∂x δx.
 
-use super::{ContactPoint, Response};
+use super::ContactPoint;
 use crate::mechanics::loads::RigidBody;
 use crate::mechanics::loads::rigid_body::{in_space, in_use, skew, stacked, translation, turn};
 use crate::mechanics::schemes::Alphas;
@@ -46,7 +46,7 @@ pub(crate) struct FreeMotion {
 
 /// A place of contact on a free obstacle, linearised.
 pub(crate) struct FreePoint<const D: usize> {
-    /// ∂f/∂q of a part of the force.
+    /// ∂f/∂q
     pub of_motion: SMatrix<f64, D, 6>,
     /// ∂q/∂x, also through the other forces on the obstacle.
     pub motion: SMatrix<f64, 6, D>,
@@ -139,7 +139,7 @@ impl<const D: usize> FreeBalance<'_, D> {
         let mut slope = self.body.inertia_slope(q, &self.alphas);
         for one in points {
             let (f, arm) = (in_space(&one.force()), self.arm(q, one));
-            let change = self.of_motion(q, one, &one.force(), &stiffness(one));
+            let change = self.of_motion(q, one);
             // δ(Rᵀ (x − c) × f) = Rᵀ (−δd × f + (x − c) × δf + ((x − c) × f) × δφ)
             let mut moment = skew(&arm) * change;
             add_columns(&mut moment, 0, &skew(&f));
@@ -155,37 +155,30 @@ impl<const D: usize> FreeBalance<'_, D> {
         })
     }
 
-    /// ∂f/∂q of a force f with the stiffness K at fixed pose: δf = K (δd + δφ × (x − c)) + δφ × f.
-    fn of_motion(
-        &self,
-        q: &Vector<f64, 6>,
-        one: &ContactPoint<f64, D>,
-        force: &Vector<f64, D>,
-        stiffness: &Tensor<f64, D>,
-    ) -> Matrix3x6<f64> {
-        let (stiffness, turning) = (embed(stiffness), self.body.turning(q));
+    /// ∂f/∂q of the force f with the stiffness K at fixed pose: δf = K (δd + δφ × (x − c)) + δφ × f.
+    fn of_motion(&self, q: &Vector<f64, 6>, one: &ContactPoint<f64, D>) -> Matrix3x6<f64> {
+        let (stiffness, turning) = (embed(&one.stiffness()), self.body.turning(q));
         let mut change = Matrix3x6::zeros();
         add_columns(&mut change, 0, &stiffness);
-        let turned = stiffness * skew(&self.arm(q, one)) + skew(&in_space(force));
+        let turned = stiffness * skew(&self.arm(q, one)) + skew(&in_space(&one.force()));
         mutant!("free obstacles: forces do not turn with the obstacle": turned = stiffness * skew(&self.arm(q, one)));
         add_columns(&mut change, 3, &(turned * -turning));
         change
     }
 
-    /// ∂q/∂x of a point, and ∂f/∂q of a part of its force.
+    /// ∂q/∂x of a point, and ∂f/∂q of its force.
     pub fn linearized(
         &self,
         FreeMotion { q, inverse_slope, .. }: &FreeMotion,
         one: &ContactPoint<f64, D>,
-        response: Response,
     ) -> FreePoint<D> {
-        let (stiffness, f, arm) = (embed(&stiffness(one)), in_space(&one.force()), self.arm(q, one));
+        let (stiffness, f, arm) = (embed(&one.stiffness()), in_space(&one.force()), self.arm(q, one));
         // δ((x − c) × f) = δx × f − (x − c) × K δx
         let moment = self.body.turned(q).transpose() * -(skew(&f) + skew(&arm) * stiffness);
         let of_place = Matrix6x3::from_fn(|i, k| if i < 3 { -stiffness[(i, k)] } else { moment[(i - 3, k)] });
         let of_place = Matrix6x3::from_fn(|i, k| if in_use::<D>(i) { of_place[(i, k)] } else { 0.0 });
         let motion = inverse_slope * -of_place;
-        let of_motion = self.of_motion(q, one, &one.force_of(response), &one.stiffness_of(response));
+        let of_motion = self.of_motion(q, one);
         FreePoint {
             of_motion: SMatrix::from_fn(|i, k| if in_use::<D>(k) { of_motion[(i, k)] } else { 0.0 }),
             motion: SMatrix::from_fn(|i, k| motion[(i, k)]),
@@ -215,11 +208,6 @@ impl<const D: usize> FreePoint<D> {
         self.of_motion += SMatrix::<f64, D, 6>::from_fn(|i, k| weights[i] * of_motion[(i, k)]);
         self.motion += SMatrix::<f64, 6, D>::from_fn(|i, k| motion[(i, k)] * weights[k]);
     }
-}
-
-/// −∂f/∂x of the whole force, at a fixed pose.
-fn stiffness<const D: usize>(one: &ContactPoint<f64, D>) -> Tensor<f64, D> {
-    one.stiffness_of(Response::Pressure) + one.stiffness_of(Response::Friction)
 }
 
 /// A motion whose turn is shortened to π where it is longer. Longer turns need more terms of their series.

@@ -1,12 +1,19 @@
-//! The law of contact between a point of a surface and an obstacle or another body: a one-sided penalty, and Coulomb friction with an
-//! elastic slip.
+//! The law of contact between a point of a surface and an obstacle or another body: a one-sided penalty, and Coulomb friction by a return map
+//! (Simo and Laursen, Comput. Struct. 42, 1992).
 //!
 //! All vectors are in the frame of the obstacle, where the obstacle rests. The surface of another body counts as a plane through the
 //! projection of the point, and all vectors are relative to the material there. With the gap g < 0, the normal n = ∇g, the position y of the
 //! point and its anchor a, the traction on the body per reference area is
 //!
-//! - pressure: p n with p = −k g
-//! - friction: −μ p s/ε while |s| ≤ ε (stick), else −μ p s/|s| (slip), with the slip s = (1 − n ⊗ n)(y − a)
+//! ```text
+//! pressure   p n          p = −k g                     potential ½ k g²
+//! trial      t* = −k s    s = (1 − n ⊗ n)(y − a)
+//! stick      t = t*       if |t*| ≤ μ p                potential ½ k |s|², a stays
+//! slip       t = μ p t*/|t*|                           a follows at the distance μ p/k at the end of the step
+//! ```
+//!
+//! The stiffness of stick does not grow with the pressure. A stiffness that did would make the tangent unsymmetric in stick, too, and bodies
+//! at rest would flutter.
 //!
 //! In the energy–momentum scheme, p is the mean over the step from the gap g_n to g_{n+1}, with the potential ψ = ½ k ⟨−g⟩²:
 //!
@@ -14,24 +21,21 @@
 //!
 //! It acts along the normal at the middle of the step. Its work on a plane that does not turn is the change of ψ, also in steps in which
 //! contact begins or ends.
-//!
-//! Under large pressures ε grows to μ p/k. Friction in stick is then −k s, and has a potential.
-//!
-//! The smallest elastic slip is a small part of the grid spacing. This slip does not depend on the pressure, so Newton's method also finds
-//! the points that stick under small pressures.
 
+use crate::material::{Law, p_wave_modulus, poissons_ratio};
 use crate::scalar::Real;
 use crate::shape::Feature;
 use crate::tensor::{Tensor, Vector, identity, outer};
 
-/// The state of friction.
-enum State {
-    /// Stick under a large pressure: −k s.
-    Spring,
-    /// Stick: −μ p s/ε.
-    Stick,
-    /// Slip: −μ p s/|s|.
-    Slip,
+/// The largest modulus of contact in units of G. It is that of ν = 1/3, and bounds the stiffness of nearly incompressible bodies.
+const MOST_SHEAR: f64 = 4.0;
+
+/// The pressure at a depth of one spacing, for a penalty stiffness of 1: Λ + 2G of a law, but at most 4G.
+pub(crate) fn contact_modulus<L: Law>(law: &L) -> f64 {
+    let (uniaxial, nu) = (p_wave_modulus(law), poissons_ratio(law));
+    // G = (Λ + 2G) (1 − 2ν)/(2 (1 − ν))
+    let shear = uniaxial * (1.0 - 2.0 * nu) / (2.0 * (1.0 - nu));
+    if shear > 0.0 { uniaxial.min(MOST_SHEAR * shear) } else { uniaxial }
 }
 
 /// The law of contact at one point.
@@ -43,8 +47,6 @@ pub(crate) struct ContactLaw<const D: usize> {
     pub(super) stiffness: f64,
     /// μ
     pub(super) friction: f64,
-    /// ε
-    pub(super) elastic_slip: f64,
     /// a
     pub(super) anchor: Vector<f64, D>,
     /// The ends of the step, where the pressure is the mean between them.
@@ -63,31 +65,27 @@ pub(super) struct Ends<const D: usize> {
     pub(super) shift: Vector<f64, D>,
 }
 
-/// The parts of the traction.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Response {
-    /// The pressure p n.
-    Pressure,
-    /// Friction.
-    Friction,
-}
-
 impl<const D: usize> ContactLaw<D> {
     /// The traction on the body, per reference area.
-    pub fn traction<T: Real>(&self, response: Response, y: &Vector<T, D>) -> Vector<T, D> {
+    pub fn traction<T: Real>(&self, y: &Vector<T, D>) -> Vector<T, D> {
         let (normal, pressure) = (self.feature.at(y).normal, self.pressure(y));
-        if response == Response::Pressure {
-            mutant!("contact: an obstacle pulls": { return normal * -pressure; });
-            return normal * pressure;
+        mutant!("contact: an obstacle pulls": pressure = -pressure);
+        normal * pressure + self.friction_under(pressure, y, &normal)
+    }
+
+    /// The part of the traction by friction.
+    pub fn friction<T: Real>(&self, y: &Vector<T, D>) -> Vector<T, D> {
+        self.friction_under(self.pressure(y), y, &self.feature.at(y).normal)
+    }
+
+    fn friction_under<T: Real>(&self, pressure: T, y: &Vector<T, D>, normal: &Vector<T, D>) -> Vector<T, D> {
+        if !self.has_friction() {
+            return Vector::zeros();
         }
-        let slip = self.slip(y, &normal);
-        mutant!("contact: friction pushes forwards": slip = -slip);
-        let length = slip.dot(&slip);
-        match self.state(length.value().sqrt(), pressure.value()) {
-            State::Spring => slip * T::lit(-self.stiffness),
-            State::Stick => slip * (-pressure * T::lit(self.friction / self.elastic_slip)),
-            State::Slip => slip * (-pressure * T::lit(self.friction) * length.sqrt().recip()),
-        }
+        let trial = self.slip(y, normal) * T::lit(-self.stiffness);
+        mutant!("contact: friction pushes forwards": trial = -trial);
+        let (size, limit) = (trial.dot(&trial), pressure * T::lit(self.friction));
+        if size.value() <= limit.value().powi(2) { trial } else { trial * (limit * size.sqrt().recip()) }
     }
 
     /// p
@@ -126,45 +124,29 @@ impl<const D: usize> ContactLaw<D> {
         Some((T::lit(mean.gap), mean.feature.at(&end).distance))
     }
 
-    /// The state of friction at a slip of this length.
-    fn state(&self, length: f64, pressure: f64) -> State {
-        let limit = self.friction * pressure / self.stiffness;
-        if length > limit.max(self.elastic_slip) {
-            State::Slip
-        } else if limit > self.elastic_slip {
-            State::Spring
-        } else {
-            State::Stick
-        }
-    }
-
     /// −∂t/∂y of the traction t.
-    pub fn tangent(&self, response: Response, y: &Vector<f64, D>) -> Tensor<f64, D> {
+    pub fn tangent(&self, y: &Vector<f64, D>) -> Tensor<f64, D> {
         let (n, pressure) = (self.feature.at(y).normal, self.pressure(y));
         let (slope, mu) = (self.pressure_slope(y), self.friction);
         let curvature = self.feature.curvature(y);
-        if response == Response::Pressure {
-            mutant!("contact: the tangent lacks the curvature of the obstacle": curvature = Tensor::zeros());
-            // −n ⊗ ∂p/∂y − p ∇²g, which is k (n ⊗ n + g ∇²g) at one instant
-            return outer(&n, &slope) - curvature * pressure;
+        mutant!("contact: the tangent lacks the curvature of the obstacle": curvature = Tensor::zeros());
+        // −n ⊗ ∂p/∂y − p ∇²g, which is k (n ⊗ n + g ∇²g) at one instant
+        let of_pressure = outer(&n, &slope) - curvature * pressure;
+        if !self.has_friction() {
+            return of_pressure;
         }
-        let r = y - self.anchor;
-        let slip = self.slip(y, &n);
+        let (r, slip) = (y - self.anchor, self.slip(y, &n));
         // ∂s/∂y = 1 − n ⊗ n − (n·r) ∇²g − n ⊗ ∇²g r
         let of_slip = identity::<f64, D>() - outer(&n, &n) - curvature * n.dot(&r) - outer(&n, &(curvature * r));
-        let length = slip.norm();
-        // −∂t/∂y = μ (q ⊗ ∂p/∂y + p ∂q/∂y), with t = −μ p q
-        let (q, of_q) = match self.state(length, pressure) {
-            State::Spring => return of_slip * self.stiffness,
-            State::Stick => (slip / self.elastic_slip, of_slip / self.elastic_slip),
-            State::Slip => {
-                let m = slip / length;
-                (m, (identity::<f64, D>() - outer(&m, &m)) * of_slip / length)
-            }
-        };
-        let of_pressure = -outer(&q, &slope);
-        mutant!("contact: friction does not feel the change of pressure": of_pressure = Tensor::zeros());
-        (of_pressure + of_q * pressure) * mu
+        let (length, longest) = (slip.norm(), mu * pressure / self.stiffness);
+        if length <= longest {
+            return of_pressure + of_slip * self.stiffness;
+        }
+        // With m = s/|s| and t = −μ p m: −∂t/∂y = μ (m ⊗ ∂p/∂y + p (1 − m ⊗ m) ∂s/∂y/|s|)
+        let m = slip / length;
+        let of_limit = -outer(&m, &slope);
+        mutant!("contact: friction does not feel the change of pressure": of_limit = Tensor::zeros());
+        of_pressure + (of_limit + (identity::<f64, D>() - outer(&m, &m)) * of_slip * (pressure / length)) * mu
     }
 
     /// ½ k g², the potential of the pressure per reference area.
@@ -173,19 +155,29 @@ impl<const D: usize> ContactLaw<D> {
         gap * gap * T::lit(0.5 * self.stiffness)
     }
 
-    /// The anchor after a step that ends at `y`: it follows a slip at the distance of the elastic slip.
-    pub fn new_anchor(&self, y: &Vector<f64, D>) -> Vector<f64, D> {
-        let slip = self.slip(y, &self.feature.at(y).normal);
-        let length = slip.norm();
-        mutant!("contact: a slip does not move the anchor": length = 0.0);
-        let elastic = self.elastic_slip.max(self.friction * self.depth(y));
-        if length <= elastic { self.anchor } else { y - slip * (elastic / length) }
+    /// ½ k |s|², the energy stored by the elastic slip per reference area. The anchor is that of an end of a step.
+    pub fn slip_energy(&self, y: &Vector<f64, D>) -> f64 {
+        let slip = self.elastic_slip(y);
+        mutant!("contact: the elastic slip stores nothing": slip = Vector::zeros());
+        if self.has_friction() { 0.5 * self.stiffness * slip.norm_squared() } else { 0.0 }
     }
 
-    /// The part of a vector along the surface, which is a plane between bodies.
-    pub fn along(&self, v: &Vector<f64, D>) -> Vector<f64, D> {
-        let normal = self.feature.at(v).normal;
-        v - normal * normal.dot(v)
+    /// Whether μ > 0.
+    pub fn has_friction(&self) -> bool {
+        self.friction > 0.0
+    }
+
+    /// The elastic slip at the end of a step, at most μ p/k long.
+    pub fn elastic_slip(&self, y: &Vector<f64, D>) -> Vector<f64, D> {
+        let slip = self.slip(y, &self.feature.at(y).normal);
+        let (length, longest) = (slip.norm(), self.friction * self.depth(y));
+        mutant!("contact: a slip does not move the anchor": longest = f64::INFINITY);
+        if length <= longest { slip } else { slip * (longest / length) }
+    }
+
+    /// The anchor after a step that ends at `y`: it follows a slip at the distance of the elastic slip.
+    pub fn new_anchor(&self, y: &Vector<f64, D>) -> Vector<f64, D> {
+        y - self.elastic_slip(y)
     }
 
     /// −g, the depth of the point in the obstacle or in the other body.
@@ -239,26 +231,34 @@ mod tests {
                             shift: -(turn * start),
                         });
                         let (feature, stiffness) = (feature.clone(), 50.0);
-                        let law = ContactLaw { feature, stiffness, friction, elastic_slip: 0.01, anchor, mean };
+                        let law = ContactLaw { feature, stiffness, friction, anchor, mean };
                         if start.is_none() && middle > 0.0 {
                             continue;
                         }
-                        for response in [Response::Pressure, Response::Friction] {
-                            let tangent = law.tangent(response, &y);
-                            for k in 0..3 {
-                                let seeded = Vector::from_fn(|i, _| Dual64::new(y[i], f64::from(i == k)));
-                                let dual = law.traction(response, &seeded).map(|t| -t.eps);
-                                let error = (tangent.column(k) - dual).norm();
-                                assert!(
-                                    error < 1e-12 * 50.0,
-                                    "{before}, {middle}, slip {slip}, {response:?}: {error:e}"
-                                );
-                            }
+                        let tangent = law.tangent(&y);
+                        for k in 0..3 {
+                            let seeded = Vector::from_fn(|i, _| Dual64::new(y[i], f64::from(i == k)));
+                            let dual = law.traction(&seeded).map(|t| -t.eps);
+                            let error = (tangent.column(k) - dual).norm();
+                            assert!(error < 1e-12 * 50.0, "{before}, {middle}, slip {slip}: {error:e}");
                         }
                     }
                 }
             }
         }
+    }
+
+    #[test]
+    fn a_point_that_sticks_stores_the_work_of_its_friction() {
+        let normal = Vector::from([0.6, 0.8]);
+        let feature = Feature::Plane { point: Vector::zeros(), normal };
+        let anchor = normal * -0.05;
+        let law = ContactLaw { feature, stiffness: 50.0, friction: 0.4, anchor, mean: None };
+        // Up to the limit of 0.02, the traction is the gradient of the energy. A mean of both ends is exact for a square.
+        let [start, end] = [0.003, 0.017].map(|slip| anchor + Vector::from([0.8, -0.6]) * slip);
+        let work = (law.friction(&start) + law.friction(&end)).dot(&(end - start)) * 0.5;
+        let stored = law.slip_energy(&end) - law.slip_energy(&start);
+        assert!((work + stored).abs() < 1e-15 && stored > 0.0, "{work} {stored}");
     }
 
     #[test]
@@ -269,8 +269,8 @@ mod tests {
             let feature = Feature::Plane { point: Vector::zeros(), normal };
             let map = identity::<f64, 2>() * 2.0;
             let mean = Some(Ends { gap: before, feature: feature.clone(), map, shift: -start });
-            let law = ContactLaw { feature, stiffness: 3.0, friction: 0.0, elastic_slip: 0.01, anchor: start, mean };
-            let work = law.traction(Response::Pressure, &((start + end) * 0.5)).dot(&(end - start));
+            let law = ContactLaw { feature, stiffness: 3.0, friction: 0.0, anchor: start, mean };
+            let work = law.traction(&((start + end) * 0.5)).dot(&(end - start));
             let energy = |gap: f64| 1.5 * gap.min(0.0).powi(2);
             assert!((work + energy(after) - energy(before)).abs() < 1e-16, "{before}, {after}: {work}");
         }

@@ -1,14 +1,11 @@
 //! The points of surfaces that touch an obstacle or another body.
 
-use super::law::{ContactLaw, Ends, Response};
-use crate::mechanics::loads::{BodyContact, Contacts, Facing, Partner, Pose, SurfacePoint};
+use super::law::{ContactLaw, Ends};
+use crate::mechanics::loads::{BodyContact, Candidate, Contacts, Pose, Share, SurfacePoint};
 use crate::mechanics::sweep::Supports;
 use crate::scalar::Real;
 use crate::shape::Feature;
 use crate::tensor::{Tensor, Vector, identity};
-
-/// The smallest elastic slip ε in grid spacings.
-const ELASTIC_SLIP: f64 = 0.005;
 
 /// The partner of a point in contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,6 +18,8 @@ pub(crate) enum Touching {
         pair: usize,
         /// Whether the point belongs to the first body of the pair.
         is_first: bool,
+        /// The number of the candidate in [`BodyContact::candidates`].
+        candidate: usize,
     },
 }
 
@@ -37,7 +36,7 @@ pub(crate) struct ContactPoint<T, const D: usize> {
     pub touching: Touching,
     /// The number of the point in [`Contacts::points`].
     pub number: usize,
-    /// The reference area that the point stands for. Both bodies of a pair have points, each for half its area.
+    /// The reference area that the point stands for. Both bodies of a pair have points, each for a part of its area.
     pub area: f64,
     /// The places whose positions, times their shares, sum to the position of the point; relative to the other body, where it touches one.
     pub carriers: Vec<Carrier<D>>,
@@ -49,13 +48,11 @@ pub(crate) struct ContactPoint<T, const D: usize> {
     pub y: Vector<T, D>,
 }
 
-/// The surroundings of the contacts: the time, the grid spacing, the penalty stiffness of a particle's body (pressure per depth), and the
-/// position of a carrier.
+/// The surroundings of the contacts: the time, the penalty stiffness of a particle's body (pressure per depth), and the position of a carrier.
 pub(crate) struct Surroundings<'a, S, P, const D: usize> {
     pub t: f64,
     /// t_n and the positions of the particles there, where pressures are means over the step.
     pub start: Option<(f64, &'a [Vector<f64, D>])>,
-    pub spacing: f64,
     pub stiffness: S,
     pub position: P,
 }
@@ -98,12 +95,7 @@ pub(crate) fn points_on<T: Real, const D: usize>(
 /// The contact of a point with an obstacle; `None` without contact.
 fn obstacle_point<T: Real, const D: usize>(
     Contacts { points, obstacles, .. }: &Contacts<D>,
-    Surroundings { spacing, stiffness, .. }: &Surroundings<
-        '_,
-        impl Fn(usize) -> f64,
-        impl Fn(&Carrier<D>) -> Vector<T, D>,
-        D,
-    >,
+    Surroundings { stiffness, .. }: &Surroundings<'_, impl Fn(usize) -> f64, impl Fn(&Carrier<D>) -> Vector<T, D>, D>,
     ends: &StepEnds<'_, D>,
     (number, x): (usize, &Vector<T, D>),
     (index, pose): (usize, &Pose<D, T>),
@@ -130,7 +122,6 @@ fn obstacle_point<T: Real, const D: usize>(
         feature: obstacle.shape.feature(&at),
         stiffness: obstacle.stiffness * stiffness(particle),
         friction: obstacle.friction,
-        elastic_slip: ELASTIC_SLIP * spacing,
         anchor: obstacle.anchors.get(number).copied().unwrap_or(at),
         mean,
     };
@@ -138,21 +129,28 @@ fn obstacle_point<T: Real, const D: usize>(
     Some(ContactPoint { touching: Touching::Obstacle(index), number, area, carriers, pose: *pose, law, y })
 }
 
+/// The share of the area of a point in contact with another body, of whose stiffness and its own it is the part `of_stiffness`. A surface
+/// acts on the normals of the stiffer body, and an edge on those of the surface that it meets. The shares of both bodies sum to 1.
+fn share(of_stiffness: f64, [own, other]: [f64; 2]) -> f64 {
+    of_stiffness + (1.0 - of_stiffness) * own * (1.0 - other) - of_stiffness * other * (1.0 - own)
+}
+
 /// All points that touch another body.
 pub(crate) fn pair_points<T: Real, const D: usize>(
     contacts: &Contacts<D>,
     around: &Surroundings<'_, impl Fn(usize) -> f64, impl Fn(&Carrier<D>) -> Vector<T, D>, D>,
 ) -> Vec<ContactPoint<T, D>> {
-    let facing = contacts.between.iter().flat_map(|between| between.facing.iter().map(move |one| (between, one)));
-    facing.filter_map(|(between, one)| pair_point(contacts, between, one, around)).collect()
+    let Some(between) = &contacts.between else { return Vec::new() };
+    let candidates = between.candidates.iter().enumerate();
+    candidates.filter_map(|one| pair_point(contacts, between, one, around)).collect()
 }
 
-/// The contact of a point that faces another body; `None` without contact.
+/// The contact of a candidate; `None` without contact.
 fn pair_point<T: Real, const D: usize>(
     contacts: &Contacts<D>,
     between: &BodyContact<D>,
-    one: &Facing<D>,
-    Surroundings { start, spacing, stiffness, position, .. }: &Surroundings<
+    (candidate, one): (usize, &Candidate<D>),
+    Surroundings { stiffness, position, .. }: &Surroundings<
         '_,
         impl Fn(usize) -> f64,
         impl Fn(&Carrier<D>) -> Vector<T, D>,
@@ -164,34 +162,20 @@ fn pair_point<T: Real, const D: usize>(
         carriers.iter().fold(Vector::zeros(), |y, carrier| y + position(carrier) * T::lit(carrier.share));
     let feature = Feature::Plane { point: Vector::zeros(), normal: one.normal };
     let gap = one.normal.dot(&y.map(T::value));
-    let mean = start.map(|_| Ends {
-        gap: one.normal.dot(&one.start),
-        feature: feature.clone(),
-        map: identity::<f64, D>() * 2.0,
-        shift: -one.start,
-    });
-    let deepest = mean.as_ref().map_or(gap, |mean| gap.min(mean.gap).min(2.0 * gap - mean.gap));
     // NaN touches nothing.
-    if gap.is_nan() || deepest >= 0.0 {
+    if gap.is_nan() || gap >= 0.0 {
         return None;
     }
-    let softer = carriers.iter().map(|carrier| stiffness(carrier.particle)).fold(f64::INFINITY, f64::min);
-    let slip = between.slips.get(one.number).copied().unwrap_or_else(Vector::zeros);
+    let [own, other] = [&carriers[0], &carriers[1]].map(|carrier| stiffness(carrier.particle));
     // The slip is y − a along the surface.
-    let anchor = one.start - slip;
+    let anchor = one.start - one.slip;
     mutant!("contact: bodies forget their slip": anchor = one.start);
-    let law = ContactLaw {
-        feature,
-        stiffness: between.stiffness * softer,
-        friction: between.friction,
-        elastic_slip: ELASTIC_SLIP * spacing,
-        anchor,
-        mean,
-    };
+    let stiffness = between.stiffness * own.min(other);
+    let law = ContactLaw { feature, stiffness, friction: between.friction, anchor, mean: None };
     Some(ContactPoint {
-        touching: Touching::Pair { pair: one.pair, is_first: one.is_first },
+        touching: Touching::Pair { pair: one.pair, is_first: one.is_first, candidate },
         number: one.number,
-        area: 0.5 * contacts.points[one.number].area,
+        area: contacts.points[one.number].area * one.part * share(other / (own + other), one.edges),
         carriers,
         pose: Pose { rotation: identity(), shift: Vector::zeros() }.lit(),
         law,
@@ -222,36 +206,35 @@ impl<const D: usize> Carrier<D> {
     }
 }
 
-impl<const D: usize> Facing<D> {
-    /// The point, and its projection with negative shares.
+impl<const D: usize> Candidate<D> {
+    /// The point, and the closest point with negative shares.
     pub(crate) fn carriers(&self, contacts: &Contacts<D>) -> Vec<Carrier<D>> {
         let particle = |number: usize| contacts.points[number].particle;
-        let of = |&Partner { number, share, offset }: &Partner<D>| {
+        let of = |&Share { number, share, offset }: &Share<D>| {
             mutant!("contact: the other body has no reaction": { return Carrier { particle: particle(number), share: 0.0, offset }; });
             mutant!("contact: the reaction acts beside the point": { return Carrier { particle: particle(number), share: -share, offset: Vector::zeros() }; });
             Carrier { particle: particle(number), share: -share, offset }
         };
-        std::iter::once(Carrier::at(particle(self.number))).chain(self.partners.iter().map(of)).collect()
+        std::iter::once(Carrier::at(particle(self.number))).chain(self.closest.iter().map(of)).collect()
     }
 }
 
 impl<T: Real, const D: usize> ContactPoint<T, D> {
     /// The force on the body of the point.
     pub fn force(&self) -> Vector<T, D> {
-        let traction = self.law.traction(Response::Pressure, &self.y) + self.law.traction(Response::Friction, &self.y);
-        self.pose.rotation * traction * T::lit(self.area)
-    }
-
-    /// A part of this force.
-    pub fn force_of(&self, response: Response) -> Vector<T, D> {
-        self.pose.rotation * self.law.traction(response, &self.y) * T::lit(self.area)
+        self.pose.rotation * self.law.traction(&self.y) * T::lit(self.area)
     }
 }
 
 impl<const D: usize> ContactPoint<f64, D> {
-    /// −∂f/∂x of a part of the force, at a fixed pose.
-    pub fn stiffness_of(&self, response: Response) -> Tensor<f64, D> {
+    /// The energy stored by pressure and elastic slip.
+    pub fn stored(&self) -> f64 {
+        (self.law.energy(&self.y) + self.law.slip_energy(&self.y)) * self.area
+    }
+
+    /// −∂f/∂x of the force, at a fixed pose.
+    pub fn stiffness(&self) -> Tensor<f64, D> {
         let Pose { rotation, .. } = self.pose;
-        rotation * self.law.tangent(response, &self.y) * rotation.transpose() * self.area
+        rotation * self.law.tangent(&self.y) * rotation.transpose() * self.area
     }
 }

@@ -2,19 +2,22 @@
 
 use super::{Obstacle, SurfacePoint};
 use crate::tensor::Vector;
+use std::collections::BTreeMap;
 
 /// The surfaces of the bodies, and the contacts that they may have.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Contacts<const D: usize> {
     /// The points of the surfaces.
     pub points: Vec<SurfacePoint<D>>,
+    /// The points that were added since the start, in their order.
+    pub(crate) added: Vec<Added<D>>,
     /// The rigid obstacles.
     pub obstacles: Vec<Obstacle<D>>,
     /// Contact between bodies; `None` if bodies stick to each other where they share nodes.
     pub between: Option<BodyContact<D>>,
 }
 
-/// Contact between bodies of different nodal fields. Every point of a surface that faces another body is pushed out of it, and slides on it
+/// Contact between bodies of different nodal fields. Every point of a surface that enters another body is pushed out of it, and slides on it
 /// with Coulomb friction.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BodyContact<const D: usize> {
@@ -26,10 +29,19 @@ pub struct BodyContact<const D: usize> {
     pub pairs: Vec<Pair>,
     /// The energy stored in the contact at t_n.
     pub energy: f64,
-    /// The elastic slip of every point of [`Contacts::points`] at t_n. Empty without friction.
-    pub slips: Vec<Vector<f64, D>>,
-    /// The points that may touch another body in the coming step. A step finds them anew.
-    pub facing: Vec<Facing<D>>,
+    /// The elastic slips at t_n, by point and pair. Points without an elastic slip are left out.
+    pub slips: BTreeMap<[usize; 2], Vector<f64, D>>,
+    /// The points that may touch another body in the coming step. A step finds them at its start.
+    pub candidates: Vec<Candidate<D>>,
+}
+
+/// A point that was added to a surface since the start.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Added<const D: usize> {
+    /// The half of a piece of surface that had stretched: the number of its point, and the edge that was halved.
+    Half { number: usize, axis: usize },
+    /// A particle where the surface has opened: its id, the reference normal and the reference area.
+    Bare { id: u32, normal: Vector<f64, D>, area: f64 },
 }
 
 /// Two bodies that may touch.
@@ -41,31 +53,39 @@ pub struct Pair {
     pub friction_loss: f64,
 }
 
-/// A point of a surface that faces another body. The surface of the other body counts as a plane in a step, and moves with its material.
+/// A point of a surface that may touch another body. The surface of the other body counts as a plane in a step, through its closest point,
+/// and moves with its material.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Facing<const D: usize> {
+pub struct Candidate<const D: usize> {
     /// The number of the point in [`Contacts::points`].
     pub number: usize,
     /// The number of the pair in [`BodyContact::pairs`].
     pub pair: usize,
+    /// The part of the area of the point that sees the other surface, from 0 to 1. It is below 1 where the surfaces make an angle of more than
+    /// 60°.
+    pub part: f64,
+    /// How near the point, and the closest point, are to a convex edge of their body, from 0 to 1.
+    pub edges: [f64; 2],
     /// Whether the point belongs to the first body of the pair.
     pub is_first: bool,
     /// The outward normal of the other body at t_n.
     pub normal: Vector<f64, D>,
-    /// The position of the point at t_n relative to the place on the other body that carries its projection at t_{n+1}.
+    /// The position of the point at t_n, relative to the material that carries the closest point at t_{n+1}.
     pub start: Vector<f64, D>,
-    /// The points of the other surface that carry the projection.
-    pub partners: Vec<Partner<D>>,
+    /// The elastic slip at t_n, along the plane.
+    pub slip: Vector<f64, D>,
+    /// The points of the other surface that carry the closest point. Their shares sum to 1.
+    pub closest: Vec<Share<D>>,
 }
 
-/// A point of the other surface.
+/// A part of the closest point on another surface, that a point of the surface carries.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Partner<const D: usize> {
+pub struct Share<const D: usize> {
     /// The number of the point in [`Contacts::points`].
     pub number: usize,
-    /// Its share; all shares of a projection sum to 1.
+    /// Its share.
     pub share: f64,
-    /// The projection less this point, in the configuration of the last grid reset.
+    /// The closest point less this point, in the configuration of the last grid reset.
     pub offset: Vector<f64, D>,
 }
 
@@ -104,14 +124,29 @@ impl<const D: usize> Contacts<D> {
         self.obstacles.iter().map(|obstacle| obstacle.friction_loss).chain(pairs).sum()
     }
 
+    /// Halves the piece of surface around a point, for a new point with the index `particle`.
+    pub(crate) fn halve(&mut self, number: usize, axis: usize, particle: usize) {
+        let point = &mut self.points[number];
+        point.halved[axis] = point.halved[axis].saturating_add(1);
+        let half = SurfacePoint { particle, ..*point };
+        self.points.push(half);
+        self.added.push(Added::Half { number, axis });
+    }
+
+    /// Makes the particle with an id and an index a point of the surface.
+    pub(crate) fn cover(&mut self, id: u32, point: SurfacePoint<D>) {
+        self.points.push(point);
+        self.added.push(Added::Bare { id, normal: point.normal, area: point.area });
+    }
+
     /// Puts the anchors of friction to the points of surfaces at `positions` at time `t`, and the slip between bodies to zero.
     pub(crate) fn anchor(&mut self, positions: &[Vector<f64, D>], t: f64) {
         for obstacle in self.obstacles.iter_mut().filter(|obstacle| obstacle.friction > 0.0) {
             let pose = obstacle.pose(t);
             obstacle.anchors = self.points.iter().map(|point| pose.to_frame(&positions[point.particle])).collect();
         }
-        if let Some(between) = self.between.as_mut().filter(|between| between.friction > 0.0) {
-            between.slips = vec![Vector::zeros(); self.points.len()];
+        if let Some(between) = &mut self.between {
+            between.slips.clear();
         }
     }
 }
@@ -124,5 +159,10 @@ impl<const D: usize> BodyContact<D> {
         let apart = all.filter(|&[one, other]| fields[one] != fields[other]);
         let pairs = apart.map(|pair| Pair { bodies: pair.map(|body| body as u32), friction_loss: 0.0 }).collect();
         Self { stiffness, friction, pairs, ..Self::default() }
+    }
+
+    /// The elastic slip of a point on the other body of a pair at t_n.
+    pub(crate) fn slip(&self, number: usize, pair: usize) -> Vector<f64, D> {
+        self.slips.get(&[number, pair]).copied().unwrap_or_else(Vector::zeros)
     }
 }

@@ -12,7 +12,8 @@ pub(crate) mod rigid_body;
 mod rotation;
 
 pub(crate) use at_surface::at_surface_points;
-pub use contacts::{BodyContact, Contacts, Facing, Pair, Partner};
+pub(crate) use contacts::Added;
+pub use contacts::{BodyContact, Candidate, Contacts, Pair, Share};
 pub use curve::{Curve, CurveError};
 pub use force_field::{Field, ForceField};
 pub use motion_step::MotionStep;
@@ -48,8 +49,39 @@ pub struct SurfacePoint<const D: usize> {
     pub particle: usize,
     /// Outward normal N in the reference configuration, the mean of unit normals over A.
     pub normal: Vector<f64, D>,
-    /// Reference area A of the piece.
+    /// Reference area A of the piece. A piece that was halved because it has stretched to twice its area has the area that it had before.
     pub area: f64,
+    /// How often the piece was halved since the start, along each of its edges.
+    pub halved: [u8; 2],
+}
+
+impl<const D: usize> SurfacePoint<D> {
+    /// A piece that was never halved.
+    pub fn new(particle: usize, normal: Vector<f64, D>, area: f64) -> Self {
+        Self { particle, normal, area, halved: [0; 2] }
+    }
+
+    /// The reference area of the halved piece.
+    pub(crate) fn halved_area(&self) -> f64 {
+        self.area * 0.5_f64.powi(i32::from(self.halved[0]) + i32::from(self.halved[1]))
+    }
+
+    /// The D − 1 edges of the piece in the reference configuration: a square of the area A that was halved along its edges.
+    pub(crate) fn edges(&self) -> Vec<Vector<f64, D>> {
+        let edge = self.area.powf(1.0 / (D.max(2) - 1) as f64);
+        let normal = self.normal.try_normalize(0.0).unwrap_or(self.normal);
+        let mut edges: Vec<Vector<f64, D>> = Vec::new();
+        // The axes that are nearest to the plane give the directions, so that a turned scene has turned edges.
+        let mut axes: Vec<usize> = (0..D).collect();
+        axes.sort_by(|&one, &other| normal[one].abs().total_cmp(&normal[other].abs()));
+        for k in axes.into_iter().take(D - 1) {
+            let axis = Vector::from_fn(|i, _| if i == k { 1.0 } else { 0.0 });
+            let across = edges.iter().fold(axis - normal * normal[k], |x, edge| x - edge * edge.dot(&x));
+            edges.push(across.try_normalize(0.0).unwrap_or(across));
+        }
+        let length = |k: usize| edge * 0.5_f64.powi(i32::from(self.halved[k]));
+        edges.iter().enumerate().map(|(k, direction)| direction * length(k)).collect()
+    }
 }
 
 /// The kind and the value of a load on a surface.
@@ -118,7 +150,7 @@ impl<const D: usize> Loads<D> {
     ///
     /// // On a closed surface, Σ p A N = 0: here the four sides of a square, under p = 3 that doubles by t = 1.
     /// let sides = [[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]];
-    /// let side = |(particle, normal)| SurfacePoint { particle, normal: Vector::from(normal), area: 0.5 };
+    /// let side = |(particle, normal)| SurfacePoint::new(particle, Vector::from(normal), 0.5);
     /// let points = sides.into_iter().enumerate().map(side).collect();
     /// let curve = Curve::new(vec![[0.0, 1.0], [1.0, 2.0]])?;
     /// let loads = Loads { surface: vec![SurfaceLoad { pressing: Pressing::Pressure(3.0), curve, points }], ..Loads::default() };

@@ -34,6 +34,11 @@ impl<const D: usize> Reaction<D> {
     /// No reaction.
     pub(crate) const NONE: Self =
         Self { force: Vector::from_array_storage(nalgebra::ArrayStorage([[0.0; D]])), torque: 0.0 };
+
+    /// The resultant of several reactions.
+    pub(crate) fn sum(of: &[Self]) -> Self {
+        Self { force: of.iter().map(|one| one.force).sum(), torque: of.iter().map(|one| one.torque).sum() }
+    }
 }
 
 impl<const D: usize> Motion<D> {

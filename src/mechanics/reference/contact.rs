@@ -3,7 +3,6 @@
 use crate::grid::{Grid, indices};
 use crate::mechanics::loads::Prescribed;
 use crate::mechanics::sweep::Supports;
-use crate::nodes::Nodes;
 use crate::particles::Particles;
 use crate::tensor::Vector;
 use std::collections::{BTreeSet, HashMap};
@@ -12,29 +11,35 @@ use std::collections::{BTreeSet, HashMap};
 const ALONE: f64 = 1e-9;
 
 /// The prescribed conditions that a particle has reached. Its cell has a node of the condition that is not active yet. At the last grid
-/// reset, its cell had no node of the condition.
+/// reset, its cell had no node of the condition. Nodes of other nodal fields do not hold the particle.
 pub(crate) fn reached_conditions<const D: usize>(
     particles: &Particles<D>,
     prescribed: &[Prescribed<D>],
-    grid: &Grid<D>,
-    nodes: &Nodes,
+    supports: &Supports<D>,
 ) -> BTreeSet<usize> {
+    let (grid, nodes) = (supports.grid(), supports.active());
     let (present, at_reset) = (&particles.position, particles.reference().position);
+    let field = |p: usize| supports.field_of(particles.body[p]);
     let holders = |index: [u32; D]| {
         let position = grid.position(index);
         prescribed.iter().enumerate().filter(move |(_, one)| one.on.holds(grid, index, &position)).map(|(one, _)| one)
     };
-    let of_cell = |cell: [u32; D], counts: &dyn Fn(u64) -> bool| -> BTreeSet<usize> {
-        corners(cell).filter(|&index| counts(grid.id(index))).flat_map(&holders).collect()
+    let of_cell = |cell: [u32; D], counts: &dyn Fn([u32; D]) -> bool| -> BTreeSet<usize> {
+        corners(cell).filter(|&index| counts(index)).flat_map(&holders).collect()
     };
-    // The conditions that hold a node of a cell that is not active yet.
-    let inactive = |id: u64| nodes.number(id).is_none();
-    let new = cells(present.iter().map(|x| (x, ())), grid).into_iter();
-    let new: HashMap<u64, _> = new.map(|(cell, ())| (cell, of_cell(grid.index(cell), &inactive))).collect();
+    // The conditions that hold a node of a cell that is not active yet, by cell and field.
+    let of_field = |key: (u64, u32)| {
+        let (cell, field) = key;
+        mutant!("reference: nodes of the first field hold all bodies": field = 0);
+        let inactive = |index| nodes.number(grid.id_in(field, index)).is_none();
+        (key, of_cell(grid.index(cell), &inactive))
+    };
+    let new = cells(present.iter().enumerate().map(|(p, x)| (x, field(p))), grid).into_iter();
+    let new: HashMap<(u64, u32), _> = new.map(of_field).collect();
     mutant!("reference: no wall that is met resets the grid": { return BTreeSet::new(); });
     let mut reached = BTreeSet::new();
-    for (x, before) in present.iter().zip(at_reset) {
-        let met = grid.cell(x).and_then(|cell| new.get(&grid.id(cell))).filter(|met| !met.is_empty());
+    for (p, (x, before)) in present.iter().zip(at_reset).enumerate() {
+        let met = grid.cell(x).and_then(|cell| new.get(&(grid.id(cell), field(p)))).filter(|met| !met.is_empty());
         let Some(met) = met else { continue };
         let were_there = grid.cell(before).map_or_else(BTreeSet::new, |cell| of_cell(cell, &|_| true));
         reached.extend(met.difference(&were_there));

@@ -4,6 +4,7 @@ use crate::material::Law;
 use crate::mechanics::loads::ForceField;
 use crate::mechanics::loads::{Loads, PrescribedDof, Reaction};
 use crate::mechanics::residual::{Equilibrium, Inadmissible};
+use crate::mechanics::sweep::Supports;
 use crate::mechanics::terms::Step;
 use crate::mechanics::trial::Trial;
 use crate::pooled::Pooled;
@@ -15,7 +16,7 @@ use std::sync::Arc;
 pub struct LastEquilibrium<const D: usize> {
     /// The loads of the step. A force field keeps the values that it had there.
     pub(crate) loads: Loads<D>,
-    /// The reaction of each prescribed condition.
+    /// The reactions of each prescribed condition on the bodies of each nodal field. Bodies of different fields do not share a reaction.
     pub(crate) reactions: Vec<Reaction<D>>,
     /// Whether two bodies touched or shared nodes.
     pub(crate) touching: bool,
@@ -34,23 +35,21 @@ impl<const D: usize> LastEquilibrium<D> {
         let mut loads = loads.clone();
         if let Some(ForceField(field)) = loads.field.take() {
             let positions = field_positions.clone();
-            loads.field = Some(ForceField(Arc::new(move |id, _, t| field(id, &positions[id], t))));
+            loads.field = Some(ForceField(Arc::new(move |id, x, t| field(id, positions.get(id).unwrap_or(x), t))));
         }
         Self { loads, reactions, touching, field_positions }
     }
 
-    /// The reaction of a condition; none for a new condition.
-    fn reaction(&self, condition: usize) -> Reaction<D> {
-        self.reactions.get(condition).copied().unwrap_or(Reaction::NONE)
-    }
-
-    /// Whether a condition that held a body in this equilibrium has no node among `prescribed`.
-    pub(crate) fn lost_support(&self, prescribed: &[PrescribedDof]) -> bool {
+    /// Whether a condition that held bodies of a nodal field in this equilibrium has no node of the field among `prescribed`.
+    pub(crate) fn lost_support(&self, supports: &Supports<D>, prescribed: &[PrescribedDof]) -> bool {
         mutant!("reference: a support that is lost still holds": { return false; });
-        let is_lost = |&condition: &usize| {
-            self.reactions[condition] != Reaction::NONE && prescribed.iter().all(|dof| dof.owner != condition)
-        };
-        (0..self.reactions.len()).any(|condition| is_lost(&condition))
+        let fields = supports.field_count() as usize;
+        let mut holds = vec![false; self.reactions.len()];
+        for dof in prescribed {
+            let holder = dof.owner * fields + supports.field_of_node(dof.node) as usize;
+            holds.get_mut(holder).into_iter().for_each(|holds| *holds = true);
+        }
+        self.reactions.iter().zip(holds).any(|(reaction, holds)| *reaction != Reaction::NONE && !holds)
     }
 
     /// R₀ = R(0) at t_n on a new grid, under the loads of this equilibrium; `step` has the shape functions of the new grid. At prescribed
@@ -74,14 +73,19 @@ impl<const D: usize> LastEquilibrium<D> {
         let still: Pooled<Vector<f64, D>> = supports.field();
         let mut force: Pooled<Vector<f64, D>> = supports.field();
         at_start.residual_into(Trial::motion(&still), &mut force)?;
-        for (number, condition) in conditions.iter().enumerate() {
-            let dofs: Vec<_> = prescribed.iter().filter(|dof| dof.owner == number).collect();
+        let fields = supports.field_count() as usize;
+        for number in 0..conditions.len() * fields {
+            let condition = &conditions[number / fields];
+            let holder = |dof: &&PrescribedDof| dof.owner * fields + supports.field_of_node(dof.node) as usize;
+            let dofs: Vec<_> = prescribed.iter().filter(|dof| holder(dof) == number).collect();
             // The moment is m = Σ arm · r.
             let arm = |dof: &PrescribedDof| {
                 let x = supports.grid().position(supports.grid().index(supports.active().ids()[dof.node]));
                 condition.rotation().map_or(0.0, |rotation| rotation.moment(&x, dof.component, 1.0))
             };
-            subtract(&self.reaction(number), &dofs, arm, &mut force);
+            // A new condition has no reaction.
+            let reaction = self.reactions.get(number).unwrap_or(&Reaction::NONE);
+            subtract(reaction, &dofs, arm, &mut force);
         }
         Ok(force)
     }

@@ -52,6 +52,11 @@ impl<const D: usize> Supports<D> {
         self.fields.get(body as usize).copied().unwrap_or(0)
     }
 
+    /// The nodal field of an active node.
+    pub(crate) fn field_of_node(&self, node: usize) -> u32 {
+        if self.fields.is_empty() { 0 } else { self.grid.field(self.nodes.ids()[node]) }
+    }
+
     /// The active nodes of a nodal field, by number.
     pub(crate) fn nodes_of(&self, field: u32) -> std::ops::Range<usize> {
         let end = |field: u32| self.nodes.ids().partition_point(|&id| self.grid.field(id) < field);

@@ -1,12 +1,12 @@
-//! Contact with obstacles and between bodies, −Σ_Γ t A N_I with the traction t of [`contact`](crate::mechanics::contact). The pressure has a potential.
-//! Friction has none, and its tangent is not symmetric.
+//! Contact with obstacles and between bodies, −Σ_Γ t A N_I with the traction t of [`contact`](crate::mechanics::contact). Without friction it has a
+//! potential. Points that slide have none, and their tangent is not symmetric.
 
 use super::term::{FunctionsAt, Linearized, LinearizedTerm, Step, Sum, Term, summed};
-use crate::material::{Law, p_wave_modulus, poissons_ratio};
+use crate::material::Law;
 use crate::mechanics::constitutive::{Inadmissible, Part};
 use crate::mechanics::contact::{
-    Carrier, ContactPoint, FreeBalance, FreeMotion, FreePoint, Response, Surroundings, Touching, obstacle_points,
-    pair_points, points_on,
+    Carrier, ContactPoint, FreeBalance, FreeMotion, FreePoint, Surroundings, Touching, contact_modulus,
+    obstacle_points, pair_points, points_on,
 };
 use crate::mechanics::loads::{Obstacle, Pose, RigidBody};
 use crate::mechanics::sweep::{Number, Supports};
@@ -15,25 +15,17 @@ use crate::particles::Body;
 use crate::tensor::{Tensor, Vector};
 use std::collections::BTreeMap;
 
-/// The pressure of all contacts, or their friction.
+/// The forces of all contacts.
 pub(crate) struct ContactForce<'a, const D: usize, L> {
     step: Step<'a, D, L>,
-    response: Response,
     /// The pressure per depth of every body, for a penalty stiffness of 1.
     stiffness: Vec<f64>,
 }
 
 impl<'a, const D: usize, L: Law> ContactForce<'a, D, L> {
-    pub(crate) fn pressure(step: &Step<'a, D, L>) -> Option<Self> {
-        Self::of(step, Response::Pressure, step.loads.contacts.exist())
-    }
-
-    pub(super) fn friction(step: &Step<'a, D, L>) -> Option<Self> {
-        Self::of(step, Response::Friction, step.loads.contacts.have_friction())
-    }
-
-    fn of(step: &Step<'a, D, L>, response: Response, acts: bool) -> Option<Self> {
-        acts.then(|| Self { step: *step, response, stiffness: penalties(step.bodies, step.supports.grid().spacing) })
+    pub(crate) fn of(step: &Step<'a, D, L>) -> Option<Self> {
+        let acts = step.loads.contacts.exist();
+        acts.then(|| Self { step: *step, stiffness: penalties(step.bodies, step.supports.grid().spacing) })
     }
 
     /// All points in contact at Δφ.
@@ -63,7 +55,6 @@ impl<'a, const D: usize, L: Law> ContactForce<'a, D, L> {
         Surroundings {
             t: time,
             start: alphas.discrete_gradient.then_some((time - alphas.dt, &*particles.position)),
-            spacing: supports.grid().spacing,
             stiffness: |p: usize| self.stiffness[particles.body[p] as usize],
             position: move |carrier: &Carrier<D>| carrier.position(reference, supports, dphi),
         }
@@ -108,32 +99,20 @@ impl<'a, const D: usize, L: Law> ContactForce<'a, D, L> {
     }
 }
 
-/// The largest penalty stiffness in units of G/h. It is that of ν = 1/3, and bounds the stiffness of nearly incompressible bodies.
-const MOST_SHEAR: f64 = 4.0;
-
-/// The pressure per depth of every body: (Λ + 2G)/h, but at most 4 G/h.
+/// The pressure per depth of every body, for a penalty stiffness of 1.
 pub(crate) fn penalties<L: Law>(bodies: &[Body<L>], spacing: f64) -> Vec<f64> {
-    let modulus = |body: &Body<L>| {
-        let (uniaxial, nu) = (p_wave_modulus(&body.law), poissons_ratio(&body.law));
-        // G = (Λ + 2G) (1 − 2ν)/(2 (1 − ν))
-        let shear = uniaxial * (1.0 - 2.0 * nu) / (2.0 * (1.0 - nu));
-        if shear > 0.0 { uniaxial.min(MOST_SHEAR * shear) } else { uniaxial }
-    };
-    bodies.iter().map(|body| modulus(body) / spacing).collect()
+    bodies.iter().map(|body| contact_modulus(&body.law) / spacing).collect()
 }
 
 impl<const D: usize, L: Law> Term<D> for ContactForce<'_, D, L> {
     fn name(&self) -> &'static str {
-        match self.response {
-            Response::Pressure => "contact",
-            Response::Friction => "friction",
-        }
+        "contact"
     }
 
     fn add_at_nodes<T: Number>(&self, dphi: &[Vector<T, D>], out: &mut [Vector<T, D>]) {
         for one in self.contact_points(dphi) {
-            let force = one.force_of(self.response);
-            mutant!("contact: the force does not turn with the obstacle": force = one.law.traction(self.response, &one.y) * T::lit(one.area));
+            let force = one.force();
+            mutant!("contact: the force does not turn with the obstacle": force = one.law.traction(&one.y) * T::lit(one.area));
             for carrier in &one.carriers {
                 carrier
                     .weights(self.step.supports)
@@ -142,16 +121,17 @@ impl<const D: usize, L: Law> Term<D> for ContactForce<'_, D, L> {
         }
     }
 
-    /// Σ ½ k g² A. Free obstacles bring their inertia into the balance, which in space has no potential.
+    /// Σ ½ k g² A without friction. Free obstacles bring their inertia into the balance, which in space has no potential.
     fn energy<T: Number>(&self, dphi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>> {
         let energy = |one: ContactPoint<T, D>| one.law.energy(&one.y) * T::lit(one.area);
-        let has_potential = self.response == Response::Pressure && !self.step.loads.contacts.has_free_obstacle();
+        let contacts = &self.step.loads.contacts;
+        let has_potential = !contacts.have_friction() && !contacts.has_free_obstacle();
         has_potential.then(|| Ok(summed(self.contact_points(dphi).into_iter().map(energy))))
     }
 
     fn add_magnitudes_at_nodes(&self, dphi: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
         for one in self.contact_points(dphi) {
-            let force = one.force_of(self.response);
+            let force = one.force();
             for carrier in &one.carriers {
                 let share = carrier.share.abs();
                 carrier.weights(self.step.supports).for_each(|(node, n)| out[node] += force.abs() * (share * n.abs()));
@@ -163,10 +143,14 @@ impl<const D: usize, L: Law> Term<D> for ContactForce<'_, D, L> {
     fn add_sensitivity(&self, dphi: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) -> Result<(), Inadmissible> {
         let (supports, reference) = (self.step.supports, self.step.particles.reference().position);
         for LinearizedPoint { carriers, tangent, .. } in self.linearized(dphi) {
-            for Carrier { particle, share, .. } in &carriers {
-                let x = reference[*particle].abs() + supports.value_at(*particle, dphi).abs();
-                let change = tangent.abs() * x * share.powi(2);
-                supports.of(*particle).for_each(|(node, n, _)| out[node] += change * n.abs());
+            let size = |one: &Carrier<D>| {
+                let x = reference[one.particle].abs() + supports.value_at(one.particle, dphi).abs();
+                x * one.share.abs()
+            };
+            let change = tangent.abs() * carriers.iter().map(size).sum::<Vector<f64, D>>();
+            for carrier in &carriers {
+                let share = carrier.share.abs();
+                carrier.weights(supports).for_each(|(node, n)| out[node] += change * (share * n.abs()));
             }
         }
         Ok(())
@@ -187,11 +171,11 @@ impl<const D: usize, L: Law> ContactForce<'_, D, L> {
         let on_free = |one: &ContactPoint<f64, D>| {
             let Touching::Obstacle(index) = one.touching else { return None };
             let balance = self.free_balance(contacts.obstacles[index].free.as_ref()?);
-            Some((index, balance.linearized(motions[index].as_ref()?, one, self.response)))
+            Some((index, balance.linearized(motions[index].as_ref()?, one)))
         };
         let linearize = |one: &ContactPoint<f64, D>| {
-            let tangent = one.stiffness_of(self.response);
-            mutant!("contact: the tangent does not turn with the obstacle": tangent = one.law.tangent(self.response, &one.y) * one.area);
+            let tangent = one.stiffness();
+            mutant!("contact: the tangent does not turn with the obstacle": tangent = one.law.tangent(&one.y) * one.area);
             let on_free = on_free(one);
             mutant!("free obstacles: the tangent holds them": on_free = None);
             LinearizedPoint { carriers: one.carriers.clone(), tangent, on_free }

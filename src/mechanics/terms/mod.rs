@@ -94,8 +94,7 @@ impl<'a, const D: usize, L: Law> Terms<'a, D, L> {
             DeadLoad::traction(step).map(AnyTerm::DeadLoad),
             DeadLoad::out_of_balance(step).map(AnyTerm::DeadLoad),
             Pressure::of(step).map(AnyTerm::Pressure),
-            ContactForce::pressure(step).map(AnyTerm::ContactForce),
-            ContactForce::friction(step).map(AnyTerm::ContactForce),
+            ContactForce::of(step).map(AnyTerm::ContactForce),
         ];
         Self(terms.into_iter().flatten().collect())
     }

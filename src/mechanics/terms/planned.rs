@@ -33,7 +33,8 @@ pub(crate) fn planned<const D: usize>(
     let pressed = loads.loaded(|pressing| matches!(pressing, Pressing::Pressure(_)));
     let (points, obstacles) = (loads.contacts.points.len(), loads.contacts.obstacles.len());
     let pairs = loads.contacts.between.as_ref().map_or(0, |between| between.pairs.len());
-    let touched = format!("{points} points of surfaces; obstacles: {obstacles}; pairs of bodies: {pairs}");
+    let slides = if loads.contacts.have_friction() { "; friction makes the tangent unsymmetric" } else { "" };
+    let touched = format!("{points} points of surfaces; obstacles: {obstacles}; pairs of bodies: {pairs}{slides}");
     vec![
         ("inertia, lumped", moves && lumping > 0.0, inertia(format!("time.lumping = {lumping}, {scheme}"))),
         (
@@ -49,10 +50,5 @@ pub(crate) fn planned<const D: usize>(
         ("out-of-balance force", may_reset && !moves, "after a grid reset in load steps".into()),
         ("follower pressure", pressed > 0, format!("{pressed} loaded particles; makes the tangent unsymmetric")),
         ("contact", loads.contacts.exist(), touched),
-        (
-            "friction",
-            loads.contacts.have_friction(),
-            "only where contact has friction; makes the tangent unsymmetric".into(),
-        ),
     ]
 }

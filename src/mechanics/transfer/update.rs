@@ -13,7 +13,7 @@ use crate::mechanics::trial::Trial;
 use crate::mechanics::unknowns::Unknowns;
 use crate::particles::{Body, Particles};
 use crate::pooled::{Pool, Pooled};
-use crate::tensor::Vector;
+use crate::tensor::{Tensor, Vector};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -77,6 +77,8 @@ pub struct Update<'a, const D: usize> {
     impulses: Vec<f64>,
     /// The change of the particles' v and a by smoothing.
     smoothed: Option<[Pooled<Vector<f64, D>>; 2]>,
+    /// The internal variables at the end of the step, by particle.
+    memory: Option<Vec<f64>>,
 }
 
 impl<'a, const D: usize> Update<'a, D> {
@@ -121,7 +123,8 @@ impl<'a, const D: usize> Update<'a, D> {
             kept = Some(nodal.motion.pool().collect(sums));
             mutant!("transfer: the end of a step forgets the motion on a kept grid": { kept = Some(nodal.motion.pool().collect(dphi.iter().copied())); });
         }
-        Self { dphi, kept, dilatation: Vec::new(), delta_velocity, delta_acceleration, impulses, smoothed: None }
+        let (dilatation, smoothed, memory) = (Vec::new(), None, None);
+        Self { dphi, kept, dilatation, delta_velocity, delta_acceleration, impulses, smoothed, memory }
     }
 
     /// The update with dilatations of averaged cells that are unknowns of their own.
@@ -250,9 +253,49 @@ impl<'a, const D: usize> Update<'a, D> {
         first
     }
 
+    /// Evaluates the internal variables at the end of the step, which [`Self::commit`] then writes. Returns the id of the first particle of
+    /// which they, or the energy, are no numbers. Only laws with internal variables and bodies that average their dilatation can have such
+    /// particles: of all others, the residual has evaluated the stress there.
+    pub fn remember<L: Law>(
+        &mut self,
+        particles: &Particles<D>,
+        bodies: &[Body<L>],
+        supports: &Supports<D>,
+        dt: f64,
+    ) -> Option<usize> {
+        let remembered = particles.remembered;
+        let (mut next, mut first) = (particles.memory.clone(), None);
+        if remembered > 0 || !particles.dilatation.is_empty() {
+            let before = particles.reference().displacement_gradient;
+            let evaluated = |p: usize, g: Tensor<f64, D>| {
+                let law = &bodies[particles.body[p] as usize].law;
+                let memory = &particles.memory[p * remembered..(p + 1) * remembered];
+                let mut next = memory.to_vec();
+                let (at, det_f) = MaterialState::new(compose(&g, &before[p])).admissible_or_rest();
+                law.update_variables(&at.in_step(dt, memory), &mut next);
+                let energy = if law.has_potential() { law.energy(&at.in_step(0.0, &next)) } else { 0.0 };
+                let is_defined = det_f > 0.0 && energy.is_finite() && next.iter().all(|one| one.is_finite());
+                (next, is_defined || !particles.is_solid(p))
+            };
+            supports.each_particle(
+                self.motion(),
+                |p, _, g| evaluated(p, g),
+                |p, (values, is_defined)| {
+                    next[p * remembered..(p + 1) * remembered].copy_from_slice(&values);
+                    let id = particles.id[p] as usize;
+                    if !is_defined && first.is_none_or(|one| id < one) {
+                        first = Some(id);
+                    }
+                },
+            );
+        }
+        self.memory = Some(next);
+        first
+    }
+
     /// Writes the new state to the particles, once per step. No other code of a step changes positions, deformations or internal variables.
     pub fn commit<L: Law>(
-        self,
+        mut self,
         particles: &mut Particles<D>,
         bodies: &[Body<L>],
         supports: &Supports<D>,
@@ -263,7 +306,10 @@ impl<'a, const D: usize> Update<'a, D> {
         let plastic_strain: Vec<Option<usize>> = bodies.iter().map(place).collect();
         let (mut plastic, mut yielding) = (0.0, 0.0);
         particles.dilatation = dilatation::after(particles, bodies, supports, self.state());
-        let mut next = Vec::with_capacity(remembered);
+        if self.memory.is_none() {
+            self.remember(particles, bodies, supports, dt);
+        }
+        let next = self.memory.take().unwrap_or_default();
         let Particles {
             position, velocity, acceleration, displacement_gradient, volume, memory, body, reference, ..
         } = particles;
@@ -279,21 +325,14 @@ impl<'a, const D: usize> Update<'a, D> {
                 };
                 position[p] = x + delta_x;
                 displacement_gradient[p] = compose(&g, &h_r);
-                if remembered > 0 {
-                    let memory = &mut memory[p * remembered..(p + 1) * remembered];
-                    let (at, _) = MaterialState::new(displacement_gradient[p]).admissible_or_rest();
-                    let body = body[p] as usize;
-                    next.clear();
-                    next.extend_from_slice(memory);
-                    bodies[body].law.update_variables(&at.in_step(dt, memory), &mut next);
-                    if let Some(place) = plastic_strain[body] {
-                        plastic += volume[p];
-                        yielding += if next.get(place) > memory.get(place) { volume[p] } else { 0.0 };
-                    }
-                    memory.copy_from_slice(&next);
+                if let Some(place) = plastic_strain[body[p] as usize] {
+                    plastic += volume[p];
+                    let variable = p * remembered + place;
+                    yielding += if next.get(variable) > memory.get(variable) { volume[p] } else { 0.0 };
                 }
             },
         );
+        *memory = next;
         // Without inertia there are no increments.
         let increments = [(velocity, self.delta_velocity), (acceleration, self.delta_acceleration)];
         let with_changes = increments.into_iter().zip(self.smoothed.unwrap_or_default());

@@ -67,7 +67,7 @@ fn block<const D: usize>(shape: &Approximation, lumping: f64) -> Result<Simulati
         particles.push(position, Vector::from_fn(|k, _| 0.5 - 0.2 * k as f64), volume, DENSITY * volume, 0);
         if index[0] == per_axis - 1 {
             let normal = Vector::from_fn(|k, _| if k == 0 { 1.0 } else { 0.0 });
-            points.push(SurfacePoint { particle: p, normal, area: 0.7 * distance.powi(D as i32 - 1) });
+            points.push(SurfacePoint::new(p, normal, 0.7 * distance.powi(D as i32 - 1)));
         }
     }
     let loads = Loads {

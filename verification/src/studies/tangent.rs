@@ -199,7 +199,7 @@ pub(super) fn cloud<const D: usize, L: Law>(
         particles.displacement_gradient[p] = regime.displacement_gradient(random);
         if index[D - 1] == per_axis - 1 {
             let normal = Vector::from_fn(|k, _| if k == D - 1 { 1.0 } else { 0.0 });
-            points.push(SurfacePoint { particle: p, normal, area: distance.powi(D as i32 - 1) });
+            points.push(SurfacePoint::new(p, normal, distance.powi(D as i32 - 1)));
         }
     }
     let mut motion = std::array::from_fn(|_| None);

@@ -2,10 +2,16 @@
 
 mod bar;
 mod between;
+mod bounce;
+mod cone;
 mod disc;
 mod free;
+mod images;
 mod incline;
 mod indentation;
+mod piles;
+mod plates;
+mod slopes;
 mod tangent;
 mod wedge;
 
@@ -14,7 +20,7 @@ use bfree::simulation::Simulation;
 use serde_json::Value;
 
 /// The summary in the list of studies.
-pub(super) const ABOUT: &str = "contact with obstacles and between bodies: tangent, impact of bars, sliding and rolling, a wedge, patch test, Hertz, discs beside finite elements, the paper's disc, free obstacles";
+pub(super) const ABOUT: &str = "contact with obstacles and between bodies: tangent, impact of bars, sliding and rolling, a wedge, patch test, Hertz, discs beside finite elements, the paper's disc, free obstacles, random blocks on slopes, plates and images, a dragged block, a ball that bounces";
 
 pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     let mut reports = tangent::reports()?;
@@ -29,6 +35,12 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     reports.push(wedge::report(effort)?);
     reports.extend(free::reports(effort)?);
     reports.push(indentation::patch()?);
+    reports.extend(slopes::reports(effort)?);
+    reports.push(piles::report(effort)?);
+    reports.push(plates::report(effort)?);
+    reports.push(images::report(effort)?);
+    reports.push(cone::report(effort)?);
+    reports.push(bounce::report(effort)?);
     if *effort == Effort::Full {
         reports.push(indentation::hertz()?);
         reports.push(indentation::point()?);

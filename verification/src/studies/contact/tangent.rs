@@ -10,15 +10,14 @@ use crate::studies::StudyError;
 use crate::studies::tangent::{SPACING, cloud};
 use bfree::approximation::{Approximation, Bspline};
 use bfree::material::{Lame, Material, NeoHookean};
-use bfree::mechanics::loads::{BodyContact, Curve, Facing, Motion, Obstacle, Partner, RigidBody, Rotation};
+use bfree::mechanics::loads::{BodyContact, Curve, Candidate, Motion, Obstacle, RigidBody, Rotation, Share};
 use bfree::shape::{Ball, Block, Cone, HalfSpace, Shape};
 use bfree::simulation::Simulation;
 use bfree::tensor::{Tensor, Vector};
 
-/// A state of friction: its name, μ, and the distance of anchors from their points in spacings. Points are 0.05 spacings deep, and the
-/// smallest elastic slip is 0.005 spacings: in `stick` it is larger than μ times the depth.
-const STATES: [(&str, f64, f64); 4] =
-    [("no friction", 0.0, 0.0), ("stick", 0.05, 2e-3), ("stick, large pressure", 0.4, 2e-3), ("slip", 0.4, 0.1)];
+/// A state of friction: its name, μ, and the distance of anchors from their points in spacings. Points are 0.05 spacings deep, so that the
+/// largest elastic slip is 0.02 spacings.
+const STATES: [(&str, f64, f64); 3] = [("no friction", 0.0, 0.0), ("stick", 0.4, 2e-3), ("slip", 0.4, 0.1)];
 
 /// Obstacles around the point `x`, so that it lies in them: a plane, a ball, a hole, an edge and a corner, and a cylinder.
 fn shapes<const D: usize>(x: &Vector<f64, D>) -> Vec<(&'static str, Shape<D>)> {
@@ -93,7 +92,7 @@ fn push<const D: usize>(
     prepared.prescribe(&mut dphi);
     let equilibrium = prepared.equilibrium(simulation);
     for measured in measure(&equilibrium, &dphi, random)? {
-        let of_contact = ["contact", "friction", "whole product", "diagonal blocks"];
+        let of_contact = ["contact", "whole product", "diagonal blocks"];
         if of_contact.contains(&measured.quantity.as_str()) {
             let labels = [&measured.quantity, what, &D.to_string(), state, way];
             report.push(&labels, measured.value, measured.bound);
@@ -116,13 +115,12 @@ fn between<const D: usize>(
         let normal = random.vector::<D>().normalize();
         let start = normal * (-0.05 * SPACING);
         let [after, before] = [(number + 1) % points.len(), (number + points.len() - 1) % points.len()];
-        let of_before = Partner { number: before, share: 0.6, offset: random.vector() * (0.2 * SPACING) };
+        let of_before = Share { number: before, share: 0.6, offset: random.vector() * (0.2 * SPACING) };
         let rest = x(number) - start - (x(before) + of_before.offset) * of_before.share;
-        let of_after = Partner { number: after, share: 0.4, offset: rest / 0.4 - x(after) };
-        between.facing.push(Facing { number, pair: 0, is_first: true, normal, start, partners: vec![of_after, of_before] });
-        if friction > 0.0 {
-            between.slips.push(random.vector() * (slip * SPACING));
-        }
+        let of_after = Share { number: after, share: 0.4, offset: rest / 0.4 - x(after) };
+        let slip = random.vector() * (slip * SPACING);
+        let (part, edges, closest) = (0.8, [0.3, 0.6], vec![of_after, of_before]);
+        between.candidates.push(Candidate { number, pair: 0, part, edges, is_first: true, normal, start, slip, closest });
     }
     between
 }

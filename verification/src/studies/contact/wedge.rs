@@ -11,9 +11,6 @@ const WEIGHT: f64 = 5.0;
 const HEIGHT: f64 = 0.5;
 const SPACING: f64 = 0.25;
 
-/// The elastic slip of the law in spacings.
-const EPSILON: f64 = 0.005;
-
 /// The way of the plate along the wedge.
 const WAY: f64 = 0.02;
 
@@ -41,16 +38,16 @@ pub(super) fn report(effort: &Effort) -> Result<Report, StudyError> {
             "solver": { "krylov": { "preconditioner": "multigrid" } }
         });
         let mut simulation = built::<2>(&scene)?;
-        let (mut force, mut depth) = (f64::NAN, f64::NAN);
+        let (mut force, mut depths) = (f64::NAN, [f64::NAN; 2]);
         while simulation.clock.time() < 2.0 - 1e-9 {
-            let contact = simulation.advance()?.obstacles[1];
-            (force, depth) = (contact.force.norm(), contact.depth);
+            let contacts = simulation.advance()?.obstacles;
+            (force, depths) = (contacts[1].force.norm(), [contacts[0].depth, contacts[1].depth]);
         }
         let labels = [stiffness.to_string(), young.to_string()];
         report.push(&[&labels[0], &labels[1], "force"], (force / exact - 1.0).abs(), Bound::AtMost(1e-3));
         let [wedge, plate] = &simulation.loads.contacts.obstacles[..] else { return Err("two obstacles".into()) };
-        // The block is compressed, enters the plate, and slips by ε before it slides.
-        let before = EPSILON * SPACING + exact / (young * HEIGHT) + depth;
+        // Before the block slides, it is compressed, enters the plate, and slips elastically by μ times its depth in the wedge.
+        let before = FRICTION * depths[0] + exact / (young * HEIGHT) + depths[1];
         let friction = WEIGHT * FRICTION * angle.cos();
         let missing = (friction * WAY - wedge.friction_loss) / plate.work;
         let of_loss = |name| [labels[0].as_str(), labels[1].as_str(), name];

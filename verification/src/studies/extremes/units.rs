@@ -100,7 +100,7 @@ fn problem<const D: usize>(units: Units) -> Result<Simulation<D>, StudyError> {
     let right = (0..particles.len()).filter(|&p| particles.position[p][0] > 1.5 * length);
     let normal_x = Vector::from_fn(|k, _| if k == 0 { 1.0 } else { 0.0 });
     let area = (0.25 * length).powi(D as i32 - 1);
-    let points = right.map(|particle| SurfacePoint { particle, normal: normal_x, area }).collect();
+    let points = right.map(|particle| SurfacePoint::new(particle, normal_x, area)).collect();
     let mut simulation = simulation(grid, Lme::new(3.0, 1e-6).into(), particles, vec![body(lame, density)], dt);
     simulation.settings = settings(0.5);
     simulation.loads.gravity = Some(Gravity {

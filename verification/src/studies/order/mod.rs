@@ -179,7 +179,7 @@ fn tractions<M: Motion<D>, const D: usize>(
         for facet in body.surface_points(Some(&around), &GridBox { lower, edges, spacing: grid.spacing }) {
             let at = MaterialState::new(state(motion, &facet.position, 1.0).displacement_gradient);
             let traction = at.f * law.stress(&at) * facet.normal;
-            let point = SurfacePoint { particle: particles.len(), normal: facet.normal, area: facet.area };
+            let point = SurfacePoint::new(particles.len(), facet.normal, facet.area);
             // The particle lies slightly inside, in the cell of the body.
             particles.push_without_inertia(facet.position - facet.normal * (1e-6 * grid.spacing), 0.0, 0.0, 0);
             let curve = Curve::new(vec![[0.0, 0.0], [1.0, 1.0]])?;
