@@ -122,7 +122,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         }
     }
 
-    /// What to do where no equilibrium is found.
+    /// The likely causes of a step without equilibrium, with their cures; `None` if nothing is known.
     fn advice(&self, is_static: bool) -> Option<String> {
         let path = if self.loads.contacts.exist() { "" } else { "follow the path (time.scheme = \"arc_length\"), " };
         let load = format!(

@@ -122,7 +122,7 @@ pub enum StepError {
     /// Newton's method found no equilibrium, without inertia or with a law from a library.
     #[error("no equilibrium was found; {advice}")]
     Unbalanced {
-        /// What may be the cause, and what to do.
+        /// The likely cause and its cure, in a sentence.
         advice: String,
         /// The error of Newton's method.
         source: NewtonError<Inadmissible>,

@@ -24,7 +24,7 @@ use tangent_check::tensor;
 
 const SEED: u64 = 7;
 
-/// What was measured in states, by their names: it does not depend on the claimed tangent.
+/// Measured tangents, by the names of their states: they do not depend on the claimed tangent.
 type Known = BTreeMap<String, judge::Measured>;
 
 /// The shipped check, which measures each state once.

@@ -49,7 +49,7 @@ pub struct SurfacePoint<const D: usize> {
     pub particle: usize,
     /// Outward normal N in the reference configuration, the mean of unit normals over A.
     pub normal: Vector<f64, D>,
-    /// Reference area A of the piece. A piece that was halved because it has stretched to twice its area has the area that it had before.
+    /// Reference area A of the piece. A piece that has stretched keeps its area when it is halved.
     pub area: f64,
     /// How often the piece was halved since the start, along each of its edges.
     pub halved: [u8; 2],

@@ -11,7 +11,7 @@ pub(super) struct Material {
     pub variables: usize,
 }
 
-/// What an input file says about its user materials.
+/// The user materials of an input file.
 #[derive(Debug, Default)]
 pub(super) struct Input {
     file: String,
