@@ -41,50 +41,56 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         if self.settings.scheme.has_inertia() || contacts.obstacles.is_empty() {
             return Ok(());
         }
-        let residual = equilibrium.residual(phi)?;
         let poses: Vec<Pose<D>> = contacts.obstacles.iter().map(|one| one.pose(equilibrium.step.time)).collect();
         let mut positions = self.particles.reference().position.to_vec();
         supports.each_value(phi, |p, u| positions[p] += u);
-        for field in 0..supports.field_count() {
+        let own = |field: u32| {
+            let particles = contacts.points.iter().map(|point| point.particle);
+            let own = particles.filter(|&p| supports.field_of(self.particles.body[p]) == field);
+            own.map(|p| positions[p]).collect::<Vec<_>>()
+        };
+        let apart = (0..supports.field_count()).map(|field| (field, own(field)));
+        let apart: Vec<_> = apart.filter(|(_, own)| self.distance_to_obstacles(own, &poses) >= 0.0).collect();
+        if apart.is_empty() {
+            return Ok(());
+        }
+        let residual = equilibrium.residual(phi)?;
+        for (field, own) in apart {
             let nodes = supports.nodes_of(field);
             let is_free = |k: usize| !prescribed.iter().any(|dof| nodes.contains(&dof.node) && dof.component == k);
             let load: Vector<f64, D> = -residual[nodes.clone()].iter().sum::<Vector<f64, D>>();
             let free = Vector::<f64, D>::from_fn(|k, _| if is_free(k) { load[k] } else { 0.0 });
             let along = free.try_normalize(0.0);
-            let particles = contacts.points.iter().map(|point| point.particle);
-            let own: Vec<_> = particles.filter(|&p| supports.field_of(self.particles.body[p]) == field).collect();
-            if let Some(motion) = along.and_then(|along| self.way_to_obstacle(&own, &positions, &poses, &along)) {
+            if let Some(motion) = along.and_then(|along| self.way_to_obstacle(&own, &poses, &along)) {
                 phi[nodes].iter_mut().for_each(|phi| *phi += motion);
             }
         }
         Ok(())
     }
 
-    /// The motion along a unit vector that takes the first of the particles `own` into an obstacle; `None` if one is in an obstacle already, or
-    /// if there is no obstacle on the way.
+    /// The least distance of places from all obstacles.
+    fn distance_to_obstacles(&self, places: &[Vector<f64, D>], poses: &[Pose<D>]) -> f64 {
+        let mut least = f64::INFINITY;
+        for (obstacle, pose) in self.loads.contacts.obstacles.iter().zip(poses) {
+            let distances = places.iter().map(|x| obstacle.shape.signed_distance(&pose.to_frame(x)));
+            least = distances.fold(least, f64::min);
+        }
+        least
+    }
+
+    /// The motion along a unit vector that takes the first of the places into an obstacle; `None` if there is no obstacle on the way.
     fn way_to_obstacle(
         &self,
-        own: &[usize],
-        positions: &[Vector<f64, D>],
+        places: &[Vector<f64, D>],
         poses: &[Pose<D>],
         along: &Vector<f64, D>,
     ) -> Option<Vector<f64, D>> {
-        let (obstacles, depth) = (&self.loads.contacts.obstacles, DEPTH * self.grid.spacing);
-        let distance = |way: f64| {
-            let of = |&p: &usize| {
-                let x = positions[p] + along * way;
-                let all = obstacles.iter().zip(poses).map(|(one, pose)| one.shape.signed_distance(&pose.to_frame(&x)));
-                all.fold(f64::INFINITY, f64::min)
-            };
-            own.iter().map(of).fold(f64::INFINITY, f64::min)
-        };
-        let mut way = 0.0;
-        if distance(way) < 0.0 {
-            return None;
-        }
+        let depth = DEPTH * self.grid.spacing;
         let longest: f64 = self.grid.cells.iter().map(|&cells| f64::from(cells) * self.grid.spacing).sum();
+        let mut way = 0.0;
         for _ in 0..MOST_STEPS {
-            let gap = distance(way);
+            let moved: Vec<_> = places.iter().map(|x| x + along * way).collect();
+            let gap = self.distance_to_obstacles(&moved, poses);
             if gap < -0.5 * depth {
                 return Some(along * way);
             }
