@@ -180,7 +180,7 @@ impl Audit {
     }
 }
 
-/// The words "an object" with its keys, such as {"acceleration": [0, 0], …} for a gravity that is given as a number.
+/// "An object" with the keys that it must have. If all keys are optional, they are listed as a choice.
 fn an_object(schema: &Value) -> String {
     let keys = schema["properties"].as_object().into_iter().flatten().map(|(key, _)| format!("`{key}`"));
     let keys: Vec<String> = keys.collect();

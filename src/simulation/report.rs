@@ -262,7 +262,7 @@ pub enum StepError {
     },
     /// The energy or an internal variable of a particle is no number.
     #[error(
-        "particle {particle} would have an energy, or an internal variable, that is not finite: take a shorter step or a stiffer body"
+        "particle {particle} would have an energy, or an internal variable, that is not finite: take a shorter step (time.step)"
     )]
     Undefined {
         /// Id of the particle.
