@@ -325,7 +325,7 @@ impl<'a, const D: usize> Update<'a, D> {
                 };
                 position[p] = x + delta_x;
                 displacement_gradient[p] = compose(&g, &h_r);
-                if let Some(place) = plastic_strain[body[p] as usize] {
+                if let Some(&Some(place)) = plastic_strain.get(body[p] as usize) {
                     plastic += volume[p];
                     let variable = p * remembered + place;
                     yielding += if next.get(variable) > memory.get(variable) { volume[p] } else { 0.0 };
