@@ -16,9 +16,9 @@
 //! # A kink between the perturbations
 //!
 //! A yield surface at the distance d divides the ladder: steps above d cross it. If both sides cross it, in a direction almost tangential to
-//! the surface, all three estimates may agree on a wrong derivative. So there is a last look near √ε, at the central difference, and at a kink
-//! also at both sides. If it contradicts, or if no side of a kink is sharp, the ladder starts anew at smaller steps. Estimates from above the
-//! kink are never averaged with those from below.
+//! the surface, all three estimates may agree on a wrong derivative. So there is a last look near √ε, at the central difference, or at a kink at
+//! both sides. A side that it contradicts is dropped, if the other one is sharp. If it contradicts the central difference or both sides, or if no side of a kink is sharp,
+//! the ladder starts anew at smaller steps. Estimates from above the kink are never averaged with those from below.
 //!
 //! # Measured
 //!
@@ -36,6 +36,7 @@ pub use estimate::Estimate;
 pub use noise::noise;
 
 use crate::law::CallFailed;
+use estimate::SHARP;
 use tableau::Tableau;
 
 /// The greatest number of extrapolations of the central difference.
@@ -58,9 +59,6 @@ const END: f64 = 5e-7;
 
 /// Where a kink lies between the greatest and the smallest perturbation, the ladder starts anew below it, at these parts of h₀.
 const RESTARTS: [f64; 3] = [1.0, 1e-3, 2.5e-5];
-
-/// A side of a kink with an error above this part of its greatest entry is not sharp: a kink may lie between its perturbations.
-const SHARP: f64 = 1e-7;
 
 /// The perturbations h_i = h₀ r⁻ⁱ.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -235,13 +233,15 @@ fn descend(
         failure: None,
         calls: 0,
     };
+    let mut last = f64::INFINITY;
     for h in ladder.perturbations().take_while(|h| *h > end) {
+        last = h;
         run.level(h)?;
         if run.finished(h, ladder) {
             break;
         }
     }
-    run.result(end)
+    run.result(last, end)
 }
 
 /// A measurement on its way down the ladder.
@@ -304,18 +304,33 @@ impl Run<'_> {
             || (ladder.first >= FIRST_STOP * h && self.tableaux().iter().all(|tableau| stalled(tableau)))
     }
 
-    /// Whether the differences at h contradict what was measured at greater perturbations: the central one, and at a kink both sides.
-    fn contradicted(&mut self, h: f64, measured: &Derivative) -> Result<bool, CallFailed> {
+    /// Whether the difference at h contradicts a side of a kink that was measured at greater perturbations.
+    fn contradicts(&mut self, (sign, last): (f64, f64), h: f64, side: &Estimate) -> Result<bool, CallFailed> {
+        let Some(value) = self.call(sign * h)? else { return Ok(false) };
+        let near = quotient(&value, self.value_at_zero, sign * h);
+        let tableau = &self.sides[usize::from(sign < 0.0)].1;
+        // With the quotient of the last level H, (H Q(h) − h Q(H))/(H − h) is free of the curvature.
+        let far = tableau.row.first().unwrap_or(&near);
+        let value = near.iter().zip(far).map(|(near, far)| near + (near - far) * h / (last - h)).collect();
+        let error = self.noise.iter().map(|u| 2.0 * last / (last - h) * u / h).collect();
+        Ok(Estimate { value, error }.disagrees(side))
+    }
+
+    /// Whether the differences at h contradict what was measured at greater perturbations: the central one, or both sides of a kink. If they
+    /// contradict one side alone, the kink lies there, and that side is dropped if the other one is sharp.
+    fn contradicted(&mut self, [last, h]: [f64; 2], measured: &mut Derivative) -> Result<bool, CallFailed> {
         if measured.has_kink() {
-            for (sign, side) in [(1.0, &measured.forward), (-1.0, &measured.backward)] {
-                let [Some(far), Some(near)] = [self.call(sign * h)?, self.call(0.5 * sign * h)?] else { continue };
-                // 2 Q(h/2) − Q(h) is free of the curvature: (4 f(h/2) − f(h) − 3 f(0))/h.
-                let value = (0..far.len()).map(|i| (4.0 * near[i] - far[i] - 3.0 * self.value_at_zero[i]) / (sign * h));
-                let error = self.noise.iter().map(|u| 8.0 * u / h).collect();
-                if (Estimate { value: value.collect(), error }).disagrees(side) {
-                    return Ok(true);
-                }
+            let forward = self.contradicts((1.0, last), h, &measured.forward)?;
+            let backward = self.contradicts((-1.0, last), h, &measured.backward)?;
+            let (dropped, kept) = match (forward, backward) {
+                (true, false) => (&mut measured.forward, &measured.backward),
+                (false, true) => (&mut measured.backward, &measured.forward),
+                (all, _) => return Ok(all),
+            };
+            if !kept.is_sharp() {
+                return Ok(true);
             }
+            *dropped = Estimate::none(self.value_at_zero.len());
             return Ok(false);
         }
         let [Some(plus), Some(minus)] = [self.call(h)?, self.call(-h)?] else { return Ok(false) };
@@ -325,14 +340,14 @@ impl Run<'_> {
         Ok(last.disagrees(&measured.best()))
     }
 
-    /// The derivative, after a last look at the perturbation h.
-    fn result(mut self, h: f64) -> Result<Derivative, CallFailed> {
+    /// The derivative, after a last look at the perturbation h. The ladder has ended at `last`.
+    fn result(mut self, last: f64, h: f64) -> Result<Derivative, CallFailed> {
         if let Some(failure) = self.failure.take_if(|_| self.sides.iter().all(|(_, side)| side.is_empty())) {
             return Err(failure);
         }
         let [central, forward, backward] = self.tableaux().map(|tableau| tableau.best.clone());
         let mut measured = Derivative { central, forward, backward, contradicted: false, calls: 0 };
-        measured.contradicted = self.contradicted(h, &measured)?;
+        measured.contradicted = self.contradicted([last, h], &mut measured)?;
         measured.calls = self.calls;
         Ok(measured)
     }

@@ -3,6 +3,9 @@
 /// Derivatives that differ by more than this number of errors differ.
 pub(crate) const ERRORS: f64 = 10.0;
 
+/// An estimate with an error above this part of its greatest entry is not sharp: a kink may lie between its perturbations.
+pub(super) const SHARP: f64 = 1e-7;
+
 /// A measured derivative with the error of each component.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Estimate {
@@ -21,6 +24,12 @@ impl Estimate {
     /// The greatest error.
     pub fn greatest_error(&self) -> f64 {
         self.error.iter().fold(0.0, |greatest, error| greatest.max(*error))
+    }
+
+    /// Whether all errors are small beside the greatest entry.
+    pub(super) fn is_sharp(&self) -> bool {
+        let values = self.value.iter().filter(|value| value.is_finite());
+        self.greatest_error() <= SHARP * values.fold(0.0_f64, |greatest, value| greatest.max(value.abs()))
     }
 
     /// Whether a component differs from that of `other` by more than ten of the errors of both.
