@@ -245,7 +245,12 @@ fn not_checked(report: &Report) -> String {
         return "Verdict: not checked. The report has no findings. Next: choose at least one state.".to_owned();
     }
     let Some(first) = unexplained(report).next() else {
-        return format!("Verdict: not checked. All states lie on kinks. Next: {}.", advice(Some(&Reason::Kink)));
+        let zero = report.findings.iter().any(|finding| finding.reason == Some(Reason::ZeroResponse));
+        let (why, reason) = match zero {
+            true => ("Response and tangent are zero in all states away from kinks", Reason::ZeroResponse),
+            false => ("All states lie on kinks", Reason::Kink),
+        };
+        return format!("Verdict: not checked. {why}. Next: {}.", advice(Some(&reason)));
     };
     let part = share(unexplained(report).count(), report);
     let next = advice(first.reason.as_ref());
