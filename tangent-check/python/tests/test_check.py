@@ -563,7 +563,7 @@ def test_the_plugin(pytester):
         [
             "Tangent check of cubes",
             "*∂R?1?/∂u?1?: claimed 8.0e0, measured 1.2e1*",
-            "*Diagnosis: The tangent of the whole is 0.666667 times the right one.",
+            "*Diagnosis: The tangent of the whole is 0.666667 times the right one.*",
             "*Response and tangent are zero in all states*",
             "The convergence of a loose solve is not quadratic: linear (1.0).",
             "*= tangent checks =*",

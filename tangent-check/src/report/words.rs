@@ -122,7 +122,9 @@ pub(super) fn summary(report: &Report) -> Option<String> {
     let greatest = |of: &dyn Fn(&Finding) -> f64| number(all.iter().map(|finding| of(finding)).fold(0.0, f64::max));
     let deviation = greatest(&|finding| finding.deviation);
     let error = greatest(&|finding| finding.error);
-    let seen = greatest(&|finding| finding.control.unwrap_or(f64::INFINITY));
+    // Where response and tangent are zero, no error is planted.
+    let seen = all.iter().filter_map(|finding| finding.control).reduce(f64::max);
+    let seen = seen.map_or(String::new(), |seen| format!(" planted errors seen from {} on,", number(seen)));
     let fewest = all.iter().map(|finding| finding.calls).min()?;
     let most = all.iter().map(|finding| finding.calls).max()?;
     let count = all.len();
@@ -132,8 +134,8 @@ pub(super) fn summary(report: &Report) -> Option<String> {
         _ => format!("{} to {} calls", calls(fewest), calls(most)),
     };
     Some(format!(
-        "{all} consistent: deviation ≤ {deviation} of the greatest entry, differences exact to {error}, planted errors seen from \
-         {seen} on, {cost}{}.",
+        "{all} consistent: deviation ≤ {deviation} of the greatest entry, differences exact to {error},{seen} \
+         {cost}{}.",
         if count == 1 { "" } else { " each" }
     ))
 }
