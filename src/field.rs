@@ -10,16 +10,20 @@ macro_rules! fields {
         ///
         /// Vectors and tensors are given in three dimensions whatever `D` is. The missing stretches are 1, so the missing components of
         /// displacement, velocity and strain are 0. The out-of-plane normal stress is that of plane (uniaxial) strain.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
+        #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
         pub enum Field {
-            $($(#[$sentence])+ #[serde(rename = $name)] $field),+
+            $($(#[$sentence])+ #[serde(rename = $name)] $field,)+
+            /// The internal variable of this name; 0 in bodies whose law does not have it. An unknown name is
+            /// answered by the names that the laws have.
+            #[serde(rename = "internal")]
+            Internal(String),
         }
 
         impl Field {
-            /// All fields.
+            /// All fields but the internal variables.
             pub const ALL: &[Self] = &[$(Self::$field),+];
 
-            /// The name in scenes and files.
+            /// The name in files, and in scenes, where an internal variable is `{"internal": name}`.
             ///
             /// ```
             /// use bfree::field::Field;
@@ -30,8 +34,11 @@ macro_rules! fields {
             /// assert_eq!(read.name(), "von_mises");
             /// # Ok::<(), serde_json::Error>(())
             /// ```
-            pub const fn name(self) -> &'static str {
-                match self { $(Self::$field => $name),+ }
+            pub fn name(&self) -> &str {
+                match self {
+                    $(Self::$field => $name,)+
+                    Self::Internal(name) => name,
+                }
             }
 
             /// The kind of its components.
@@ -42,8 +49,11 @@ macro_rules! fields {
             /// // F is not symmetric, E is.
             /// assert_eq!((Field::DeformationGradient.kind(), Field::Strain.kind()), (Kind::Tensor, Kind::Symmetric));
             /// ```
-            pub const fn kind(self) -> Kind {
-                match self { $(Self::$field => Kind::$kind),+ }
+            pub const fn kind(&self) -> Kind {
+                match self {
+                    $(Self::$field => Kind::$kind,)+
+                    Self::Internal(_) => Kind::Scalar,
+                }
             }
         }
     };
@@ -134,7 +144,7 @@ impl Field {
     /// assert!(Field::Velocity.needs_inertia() && Field::Acceleration.needs_inertia());
     /// assert!(!Field::Displacement.needs_inertia() && !Field::Stress.needs_inertia());
     /// ```
-    pub const fn needs_inertia(self) -> bool {
+    pub const fn needs_inertia(&self) -> bool {
         matches!(self, Self::Velocity | Self::Acceleration)
     }
 
@@ -148,7 +158,7 @@ impl Field {
     /// assert_eq!(Field::Velocity.columns("tip", 2), ["tip_x", "tip_y"]);
     /// assert_eq!(Field::Jacobian.columns("tip", 2), ["tip"]);
     /// ```
-    pub fn columns(self, name: &str, dimension: usize) -> Vec<String> {
+    pub fn columns(&self, name: &str, dimension: usize) -> Vec<String> {
         let count = if self.kind() == Kind::Vector { dimension } else { usize::MAX };
         self.kind().components().iter().take(count).map(|component| column(name, component)).collect()
     }

@@ -19,7 +19,7 @@ pub trait Model: Send + Sync {
     /// Who may want a step to end.
     fn stop(&mut self, stop: Option<Stop>);
     /// By the ids of the particles; as many numbers as there are particles and components.
-    fn values(&self, field: Field) -> Result<Vec<f64>, OutputError>;
+    fn values(&self, field: &Field) -> Result<Vec<f64>, OutputError>;
     fn next_step(&self) -> Result<Arc<dyn System>, StepError>;
     fn kinetic_energy(&self) -> f64;
     fn strain_energy(&self) -> f64;
@@ -56,7 +56,7 @@ impl<const D: usize> Model for Sized<D> {
         self.simulation.settings.stop = stop;
     }
 
-    fn values(&self, field: Field) -> Result<Vec<f64>, OutputError> {
+    fn values(&self, field: &Field) -> Result<Vec<f64>, OutputError> {
         field.values(&self.simulation, &self.start)
     }
 

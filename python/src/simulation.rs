@@ -48,7 +48,7 @@ impl Simulation {
         if let Some(array) = self.arrays.get(&field) {
             return Ok(array.clone_ref(py));
         }
-        let values = py.detach(|| self.model.values(field)).map_err(|error| missing(&error))?;
+        let values = py.detach(|| self.model.values(&field)).map_err(|error| missing(&error))?;
         let array = shaped(py, field.kind(), self.model.dimension(), &values)?.unbind();
         self.arrays.insert(field, array.clone_ref(py));
         Ok(array)
@@ -210,18 +210,18 @@ impl Simulation {
     /// The particles as points of PyVista, with these fields.
     #[pyo3(name = "to_pyvista", signature = (fields = vec!["displacement".to_owned(), "von_mises".to_owned(), "body".to_owned()]))]
     fn pyvista<'py>(&mut self, py: Python<'py>, fields: Vec<String>) -> PyResult<Bound<'py, PyAny>> {
-        let values = py.detach(|| self.model.values(Field::Position)).map_err(|error| missing(&error))?;
+        let values = py.detach(|| self.model.values(&Field::Position)).map_err(|error| missing(&error))?;
         let count = values.len() / 3;
         let points = py
             .import("pyvista")?
             .call_method1("PolyData", (frozen(py, values, &[count, 3])?.call_method0("copy")?,))?;
         let data = points.getattr("point_data")?;
         for name in fields {
-            let field = field(&name)?;
+            let field = field(&name);
             let array = match field.kind() {
                 // Vectors have three components there.
                 Kind::Vector => {
-                    let values = py.detach(|| self.model.values(field)).map_err(|error| missing(&error))?;
+                    let values = py.detach(|| self.model.values(&field)).map_err(|error| missing(&error))?;
                     frozen(py, values, &[count, 3])?
                 }
                 Kind::Symmetric | Kind::Tensor => {
@@ -241,15 +241,19 @@ impl Simulation {
 
 /// A field that this simulation does not have.
 fn missing(error: &OutputError) -> PyErr {
-    PyAttributeError::new_err(chain(error))
+    let OutputError::Internal { name, .. } = error else { return PyAttributeError::new_err(chain(error)) };
+    let names: Vec<&str> = Field::ALL.iter().map(Field::name).collect();
+    PyAttributeError::new_err(format!(
+        "particles have no {name:?}; they have {}, and {}",
+        names.join(", "),
+        chain(error)
+    ))
 }
 
-/// A field by its name.
-fn field(name: &str) -> PyResult<Field> {
-    Field::ALL.iter().copied().find(|field| field.name() == name).ok_or_else(|| {
-        let names: Vec<&str> = Field::ALL.iter().map(|field| field.name()).collect();
-        PyAttributeError::new_err(format!("particles have no {name:?}; they have {}", names.join(", ")))
-    })
+/// A field by its name. Any other name is that of an internal variable.
+fn field(name: &str) -> Field {
+    let known = Field::ALL.iter().find(|field| field.name() == name);
+    known.cloned().unwrap_or_else(|| Field::Internal(name.to_owned()))
 }
 
 /// The particles of a simulation, by their numbers.
@@ -261,12 +265,12 @@ pub struct Particles {
 #[pymethods]
 impl Particles {
     fn __getattr__(&self, py: Python<'_>, name: &str) -> PyResult<Py<PyAny>> {
-        let field = field(name)?;
+        let field = field(name);
         self.simulation.try_borrow_mut(py)?.array(py, field)
     }
 
     fn __dir__(&self) -> Vec<&'static str> {
-        Field::ALL.iter().map(|field| field.name()).collect()
+        Field::ALL.iter().map(Field::name).collect()
     }
 
     fn __len__(&self, py: Python<'_>) -> PyResult<usize> {

@@ -2,7 +2,7 @@
 
 use super::container::Arrays;
 use crate::clock::Reached;
-use crate::mechanics::loads::{Added, Contacts, Loads, Obstacle, Reaction, RigidBody, SurfacePoint};
+use crate::mechanics::loads::{Added, Contacts, Loads, Obstacle, PointInContact, Reaction, RigidBody, SurfacePoint};
 use crate::mechanics::path::Path;
 use crate::mechanics::reference::LastEquilibrium;
 use crate::mechanics::transfer::Nodal;
@@ -18,7 +18,8 @@ use std::borrow::Cow;
 type NamedArray<'a> = (&'static str, Cow<'a, [f64]>);
 
 /// Prefixes of arrays that may be absent or vary in length.
-const VARYING: [&str; 6] = ["reference_", "grid_", "bonded", "equilibrium", "slips", "added_points"];
+const VARYING: [&str; 7] =
+    ["reference_", "grid_", "bonded", "equilibrium", "slips", "added_points", "points_in_contact"];
 
 /// The arrays of the state at tₙ, by name. The patterns name every field: a new field does not compile until somebody decides whether it is
 /// stored. A new array is added here and in [`restore`].
@@ -34,7 +35,7 @@ pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) 
         external_work,
         dissipated,
         path: Path { load, increment, speed, weight },
-        history: History { grid, rate, constrained, bonded, equilibrium },
+        history,
         workspace: _,
     } = simulation;
     let Particles {
@@ -51,12 +52,8 @@ pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) 
         dilatation,
         reference,
     } = particles;
-    // Whether each prescribed condition has held bodies since the first step.
-    let constrained = (0..loads.prescribed.len()).map(|one| f64::from(u8::from(constrained.contains(&one))));
     let mut arrays: Vec<NamedArray<'_>> = vec![
         ("id", id.iter().map(|&id| f64::from(id)).collect()),
-        ("constrained", constrained.collect()),
-        ("bonded", bonded.iter().flatten().map(|&body| f64::from(body)).collect()),
         ("position", numbers(position)),
         ("velocity", numbers(velocity)),
         ("acceleration", numbers(acceleration)),
@@ -72,6 +69,7 @@ pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) 
         arrays.extend([
             ("slips", slips(&loads.contacts).into()),
             ("added_points", loads.contacts.added.iter().flat_map(row).collect()),
+            ("points_in_contact", loads.contacts.touching.iter().flat_map(touching_row).collect()),
         ]);
     }
     if let Some(Configuration { position, displacement_gradient, dilatation }) = reference {
@@ -81,6 +79,19 @@ pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) 
             ("reference_dilatation", numbers(dilatation)),
         ]);
     }
+    arrays.extend(of_history(history, loads.prescribed.len()));
+    arrays
+}
+
+/// The arrays of the history, in a scene with `conditions` prescribed conditions.
+fn of_history<const D: usize>(history: &History<D>, conditions: usize) -> Vec<NamedArray<'_>> {
+    let History { grid, rate, constrained, bonded, equilibrium } = history;
+    // Whether each prescribed condition has held bodies since the first step.
+    let constrained = (0..conditions).map(|one| f64::from(u8::from(constrained.contains(&one))));
+    let mut arrays: Vec<NamedArray<'_>> = vec![
+        ("constrained", constrained.collect()),
+        ("bonded", bonded.iter().flatten().map(|&body| f64::from(body)).collect()),
+    ];
     if let Some(Nodal { mass: _, iterations: _, motion, velocity, acceleration, out_of_balance }) = grid {
         arrays.extend([
             ("grid_motion", numbers(motion)),
@@ -124,14 +135,32 @@ fn row<const D: usize>(added: &Added<D>) -> Vec<f64> {
     [key, axis, area].into_iter().chain(normal.iter().copied()).collect()
 }
 
+/// A point in contact: its number, pressure, gap and traction.
+fn touching_row<const D: usize>(point: &PointInContact<D>) -> Vec<f64> {
+    let PointInContact { number, pressure, gap, traction } = point;
+    [*number as f64, *pressure, *gap].into_iter().chain(traction.iter().copied()).collect()
+}
+
 /// The elastic slips between bodies: point, pair and slip, one after the other.
 fn slips<const D: usize>(contacts: &Contacts<D>) -> Vec<f64> {
     let slips = contacts.between.iter().flat_map(|between| &between.slips);
     slips.flat_map(|(key, slip)| key.map(|number| number as f64).into_iter().chain(slip.iter().copied())).collect()
 }
 
-/// Sets what [`contact_state`] and [`slips`] return. The length of `numbers` fits.
-fn set_contact_state<const D: usize>(contacts: &mut Contacts<D>, mut numbers: &[f64], slips: &[f64]) {
+/// Sets what [`contact_state`], [`slips`] and [`touching_row`] return. The length of `contacts` fits.
+fn set_contact_state<const D: usize>(contacts: &mut Contacts<D>, arrays: &Arrays) {
+    let points = contacts.points.len();
+    let touching = values::<f64>(arrays, "points_in_contact");
+    let touching = touching.chunks_exact(3 + D).filter(|row| (row[0] as usize) < points);
+    contacts.touching = touching
+        .map(|row| PointInContact {
+            number: row[0] as usize,
+            pressure: row[1],
+            gap: row[2],
+            traction: Vector::from_column_slice(&row[3..]),
+        })
+        .collect();
+    let (mut numbers, slips) = (arrays["contacts"].as_slice(), values::<f64>(arrays, "slips"));
     for one in &mut contacts.obstacles {
         let [work, friction_loss, rest @ ..] = numbers else { return };
         (one.work, one.friction_loss) = (*work, *friction_loss);
@@ -302,7 +331,7 @@ fn restore_refined<const D: usize, L, A>(
     }
     let clock = simulation.clock.at(reached).ok_or("a time that the clock cannot show")?;
     let mut loads = simulation.loads.clone();
-    set_contact_state(&mut loads.contacts, &arrays["contacts"], arrays.get("slips").map_or(&[], Vec::as_slice));
+    set_contact_state(&mut loads.contacts, arrays);
     mutant!("checkpoint: the anchors of friction are forgotten": loads = simulation.loads.clone());
     let fields = simulation.bodies.iter().map(|body| body.field as usize + 1).max().unwrap_or(1);
     let equilibrium = equilibrium(arrays, (count, fields), &loads)?;

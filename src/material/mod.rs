@@ -40,7 +40,10 @@ pub use from_energy::{Energy, FromEnergy};
 pub use hardening::Hardening;
 pub use hencky::Radial;
 pub use lame::{Lame, LameError, LameParameters};
-pub use law::{DISSIPATED, InternalVariable, Law, PLASTIC_STRAIN, TangentBlocks, first_piola, internal_variable};
+pub use law::{
+    DISSIPATED, InternalVariable, Law, PLASTIC_STRAIN, TangentBlocks, first_piola, internal_variable,
+    internal_variable_names,
+};
 pub(crate) use list::LawVisitor;
 pub use list::{Material, Parameters};
 pub use listed::Listed;

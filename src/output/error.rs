@@ -44,6 +44,14 @@ pub enum OutputError {
     /// A velocity or acceleration was asked for, but the bodies have no inertia.
     #[error("particles without inertia have no {}", .0.name())]
     Inertia(Field),
+    /// An internal variable was asked for that no law has.
+    #[error("no law has the internal variable {name:?}; the laws have {}", if known.is_empty() { "none" } else { known })]
+    Internal {
+        /// The name asked for.
+        name: String,
+        /// The names that the laws have.
+        known: String,
+    },
     /// A probe at a particle that does not exist.
     #[error("probe {name:?} is at particle {particle}; there are {particles}, numbered from 0")]
     ProbeParticle {

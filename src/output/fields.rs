@@ -4,7 +4,7 @@ use super::{OutputError, Reference};
 use crate::field::Field;
 use crate::material::{
     DISSIPATED, Law, MaterialState, NonPositiveJacobian, PLASTIC_STRAIN, first_piola, internal_variable,
-    out_of_plane_stress, principal_values,
+    internal_variable_names, out_of_plane_stress, principal_values,
 };
 use crate::simulation::Simulation;
 use crate::tensor::{Tensor, Vector, embed, identity};
@@ -32,9 +32,9 @@ impl Field {
     ///
     /// # Errors
     /// The particle does not exist. The reference has another number of particles. A stress is asked for where det F ≤ 0. A velocity or
-    /// acceleration is asked for without inertia.
+    /// acceleration is asked for without inertia, or an internal variable that no law has.
     pub fn append<const D: usize, L: Law, A>(
-        self,
+        &self,
         simulation: &Simulation<D, L, A>,
         reference: &Reference<D>,
         id: usize,
@@ -43,12 +43,21 @@ impl Field {
         reference.check(simulation)?;
         let particles = &simulation.particles;
         let place = particles.place(id).ok_or(OutputError::NoParticle { particle: id, particles: particles.len() })?;
+        self.check(simulation)?;
         self.append_at(simulation, reference, place, out)
+    }
+
+    /// Refuses an internal variable that no law has.
+    fn check<const D: usize, L: Law, A>(&self, simulation: &Simulation<D, L, A>) -> Result<(), OutputError> {
+        let Self::Internal(name) = self else { return Ok(()) };
+        let known = internal_variable_names(simulation.bodies.iter().map(|body| &body.law));
+        let found = known.contains(&name.as_str());
+        found.then_some(()).ok_or_else(|| OutputError::Internal { name: name.clone(), known: known.join(", ") })
     }
 
     /// Appends the components at the particle with index `place` in memory, see [`Self::append`].
     fn append_at<const D: usize, L: Law, A>(
-        self,
+        &self,
         simulation: &Simulation<D, L, A>,
         reference: &Reference<D>,
         place: usize,
@@ -66,7 +75,8 @@ impl Field {
                 .map_err(|source| OutputError::Inadmissible { particle: id, source })
         };
         let symmetric = |tensor: Tensor<f64, 3>| SYMMETRIC.map(|component| tensor[component]);
-        let rate = |rates: &[Vector<f64, D>]| rates.get(place).map(padded).ok_or(OutputError::Inertia(self));
+        let rate =
+            |rates: &[Vector<f64, D>]| rates.get(place).map(padded).ok_or_else(|| OutputError::Inertia(self.clone()));
         let recalled = |name| internal_variable(law, &at(), name).unwrap_or(0.0);
         match self {
             Self::Position => out.extend(padded(&particles.position[place])),
@@ -88,6 +98,7 @@ impl Field {
             Self::EnergyDensity => out.push(law.energy(&at()) + averaged()[0]),
             Self::PlasticStrain => out.push(recalled(PLASTIC_STRAIN)),
             Self::DissipatedDensity => out.push(recalled(DISSIPATED)),
+            Self::Internal(name) => out.push(recalled(name)),
             Self::Mass => out.push(particles.mass[place]),
             Self::Volume => out.push(particles.volume[place]),
             Self::Body => out.push(f64::from(particles.body[place])),
@@ -114,11 +125,12 @@ impl Field {
     /// # Errors
     /// The errors of [`Self::append`].
     pub fn values<const D: usize, L: Law, A>(
-        self,
+        &self,
         simulation: &Simulation<D, L, A>,
         reference: &Reference<D>,
     ) -> Result<Vec<f64>, OutputError> {
         reference.check(simulation)?;
+        self.check(simulation)?;
         let places = simulation.particles.solid_places();
         let mut out = Vec::with_capacity(places.len() * self.kind().components().len());
         for place in places {

@@ -78,6 +78,9 @@ pub(crate) struct Losses {
     by_cause: [f64; Cause::ALL.len()],
     /// The largest sum of kinetic, strain and dissipated energy so far.
     largest: f64,
+    /// The lowest and the highest balance so far.
+    #[serde(default)]
+    range: [f64; 2],
 }
 
 impl Losses {
@@ -89,7 +92,13 @@ impl Losses {
             self.largest = self.largest.max(energy);
             self.by_cause[cause as usize] += self.balance - balance;
             self.balance = balance;
+            self.range = [self.range[0].min(balance), self.range[1].max(balance)];
         }
+    }
+
+    /// The lowest and the highest balance so far, as fractions of the largest energy.
+    pub fn range(&self) -> [f64; 2] {
+        self.range.map(|balance| if self.largest > 0.0 { balance / self.largest } else { 0.0 })
     }
 
     /// The loss as a fraction of the largest energy so far.

@@ -11,6 +11,9 @@ pub(crate) const SERIES: &str = "particles.pvd";
 /// The series of the obstacles.
 pub(crate) const OBSTACLES: &str = "obstacles.pvd";
 
+/// The series of the surfaces that may touch.
+pub(crate) const CONTACTS: &str = "contacts.pvd";
+
 /// Text before and after the entries.
 const HEAD: &str = "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\" byte_order=\"LittleEndian\">\n<Collection>\n";
 const TAIL: &str = "</Collection>\n</VTKFile>\n";

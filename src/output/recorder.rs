@@ -151,7 +151,7 @@ impl<const D: usize> Recorder<D> {
             .map(|every| {
                 let outlines =
                     (!loads.contacts.obstacles.is_empty()).then(|| Outlines::of(&loads.contacts, &simulation.grid));
-                Snapshots::new(directory.clone(), &fields, outlines, every, written)
+                Snapshots::new(directory.clone(), &fields, outlines, loads.contacts.exist(), every, written)
             })
             .transpose()?;
         Ok(Self {
@@ -303,13 +303,14 @@ impl<const D: usize> Recorder<D> {
         }
         self.flush()?;
         let (time, known) = (simulation.clock.time(), self.so_far.watch.warnings.len());
-        self.so_far.watch.end(time, self.so_far.counts.steps);
+        let has_inertia = simulation.settings.scheme.has_inertia();
+        self.so_far.watch.end(time, self.so_far.counts.steps, has_inertia);
         self.so_far.watch.warnings[known..].iter().for_each(|warning| self.progress.warn(warning));
         let particles = &simulation.particles;
         let summary = Summary {
             time,
             mass: particles.mass.iter().sum(),
-            has_inertia: simulation.settings.scheme.has_inertia(),
+            has_inertia,
             energies: Energies::of(simulation, &self.reference),
             momentum_change: (particles.momentum() - self.reference.momentum).norm(),
             momentum_scale: particles.mass.iter().zip(&particles.velocity).fold(0.0, |sum, (m, v)| sum + m * v.norm()),

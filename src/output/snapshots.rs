@@ -1,10 +1,11 @@
-//! Snapshots of the particles and of the obstacles: `particles_*.vtu`, `obstacles_*.vtu`, and the series `particles.pvd` and `obstacles.pvd`.
+//! Snapshots of the particles, of the obstacles and of surfaces that may touch: `particles_*.vtu`, `obstacles_*.vtu`, `contacts_*.vtu`, and
+//! their series, such as `particles.pvd`.
 
 use super::fields::padded;
 use super::outlines::Outlines;
-use super::pvd::{self, OBSTACLES, SERIES};
+use super::pvd::{self, CONTACTS, OBSTACLES, SERIES};
 use super::vtu::{Array, Background, Snapshot};
-use super::{OutputError, Reference};
+use super::{OutputError, Reference, touching};
 use crate::clock::Clock;
 use crate::field::{Field, Kind};
 use crate::material::Law;
@@ -19,8 +20,10 @@ pub(crate) struct Snapshots<const D: usize> {
     fields: Vec<Field>,
     /// The obstacles, if there are any.
     outlines: Option<Outlines<D>>,
-    /// The entries of the series of particles, and of that of obstacles.
-    entries: [String; 2],
+    /// Whether surfaces may touch.
+    touches: bool,
+    /// The entries of the series of particles, obstacles and surfaces.
+    entries: [String; 3],
     /// Time between snapshots.
     every: f64,
     pub(crate) mark: SnapshotMark,
@@ -37,11 +40,11 @@ pub(crate) struct SnapshotMark {
     passed: Option<f64>,
 }
 
-/// File names of a snapshot of particles begin with this, and of one of obstacles.
-const STEMS: [&str; 2] = ["particles_", "obstacles_"];
+/// File names of a snapshot of particles begin with this, and of one of obstacles and of surfaces.
+const STEMS: [&str; 3] = ["particles_", "obstacles_", "contacts_"];
 
-/// File names of a snapshot of particles, and of one of obstacles.
-fn names(number: usize) -> [String; 2] {
+/// File names of a snapshot of particles, of obstacles and of surfaces.
+fn names(number: usize) -> [String; 3] {
     STEMS.map(|stem| format!("{stem}{number:06}.vtu"))
 }
 
@@ -82,6 +85,7 @@ impl<const D: usize> Snapshots<D> {
         directory: PathBuf,
         fields: &[Field],
         outlines: Option<Outlines<D>>,
+        touches: bool,
         every: f64,
         mark: SnapshotMark,
     ) -> Result<Self, OutputError> {
@@ -89,16 +93,16 @@ impl<const D: usize> Snapshots<D> {
             return Err(OutputError::SnapshotEvery(every));
         }
         let unique = fields.iter().enumerate().filter(|&(k, field)| !fields[..k].contains(field));
-        let mut entries = [const { String::new() }; 2];
-        let series = [Some(SERIES), outlines.as_ref().map(|_| OBSTACLES)];
+        let mut entries = [const { String::new() }; 3];
+        let series = [Some(SERIES), outlines.as_ref().map(|_| OBSTACLES), touches.then_some(CONTACTS)];
         for (entries, series) in entries.iter_mut().zip(series).filter(|_| mark.written > 0) {
             let Some(series) = series else { continue };
             let path = directory.join(series);
             *entries = pvd::first_entries(&path, mark.written)?;
             pvd::write(&path, entries)?;
         }
-        let fields = unique.map(|(_, &field)| field).collect();
-        Ok(Self { fields, directory, outlines, entries, every, mark })
+        let fields = unique.map(|(_, field)| field.clone()).collect();
+        Ok(Self { fields, directory, outlines, touches, entries, every, mark })
     }
 
     /// Whether the time has reached a multiple of `every` since the last call that was due, or there was no such call.
@@ -121,11 +125,14 @@ impl<const D: usize> Snapshots<D> {
         if self.mark.last == Some(step) {
             return Ok(());
         }
-        let [file, of_obstacles] = names(self.mark.written);
+        let [file, of_obstacles, of_surfaces] = names(self.mark.written);
         let particles = snapshot(simulation, reference, &self.fields)?;
         if let Some(outlines) = &self.outlines {
             let outlines = outlines.at(&simulation.loads.contacts, simulation.clock.time(), &particles);
             self.add(1, OBSTACLES, &outlines, &of_obstacles)?;
+        }
+        if self.touches {
+            self.add(2, CONTACTS, &touching::snapshot(simulation, &particles), &of_surfaces)?;
         }
         self.add(0, SERIES, &particles, &file)?;
         self.mark.written += 1;

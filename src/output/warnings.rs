@@ -14,6 +14,9 @@ const CREATED: f64 = 0.01;
 /// Lost energy, as a fraction of the largest total energy so far, above which there is a warning.
 const LOST: f64 = 0.02;
 
+/// Energy that is lost or created and comes back, as a fraction of the largest total energy, above which there is a warning at the end.
+const SWUNG: f64 = 0.05;
+
 /// The depth of a body in an obstacle, in grid spacings, above which there is a warning.
 const DEEP: f64 = 0.25;
 
@@ -37,6 +40,8 @@ pub enum Kind {
     EnergyCreated,
     /// With inertia, the balance of energy is below zero.
     EnergyLost,
+    /// With inertia, the balance of energy has left zero and come back.
+    EnergySwung,
     /// A step was taken with less than its nominal length, because a longer one failed.
     StepHalved,
     /// The local error of a step is above the tolerance, and the step could not be halved.
@@ -277,16 +282,40 @@ impl Watch {
         }
     }
 
-    /// Ends the run after step `number`, which ended at `time`. A loss of energy is reported again with its final size.
-    pub(crate) fn end(&mut self, time: f64, step: u64) {
+    /// Ends the run after step `number`, which ended at `time`. A loss of energy is reported again with its final size. Of the last steps,
+    /// and of losses and gains that came back, this is the first report.
+    pub(crate) fn end(&mut self, time: f64, step: u64, has_inertia: bool) {
         let kind = Kind::EnergyLost;
-        let mut told = self.warnings.iter().filter(|warning| warning.kind == kind).map(|warning| warning.time);
-        let Some(first) = told.next() else { return };
+        let of = |kind| self.warnings.iter().filter(move |warning| warning.kind == kind).map(|warning| warning.time);
+        let mut told = of(kind);
+        let Some(first) = told.next() else {
+            if has_inertia && self.seen > USUAL_AFTER && of(Kind::EnergyCreated).next().is_none() {
+                self.end_untold(time, step);
+            }
+            return;
+        };
         if self.losing > 0 && told.next_back().unwrap_or(first) != time {
             let said = self.losses.says(self.lumped);
             let message = format!("{said}; more than {} % since t = {first}", 100.0 * LOST);
             self.warnings.push(Warning { kind, time, step, message });
         }
+    }
+
+    /// Warns of a loss in the last steps, or of a balance that swung, in a run without a warning of its energy.
+    fn end_untold(&mut self, time: f64, step: u64) {
+        let [low, high] = self.losses.range().map(|part| 100.0 * part);
+        let warning = if self.losing > 0 {
+            Some((Kind::EnergyLost, self.losses.says(self.lumped)))
+        } else if high - low > 100.0 * SWUNG {
+            let text = format!(
+                "energy was lost or created, and came back: the balance lay between {low:+.1} % and {high:+.1} % of the largest total energy; \
+                 history.csv shows when; shorten time.step, or give time.adaptive a tolerance"
+            );
+            Some((Kind::EnergySwung, text))
+        } else {
+            None
+        };
+        self.warnings.extend(warning.map(|(kind, message)| Warning { kind, time, step, message }));
     }
 
     /// Adds a warning, if it is the first of its kind.
@@ -347,7 +376,7 @@ mod tests {
     /// Ends the run and returns the new warning.
     fn last(watch: &mut Watch, time: f64, number: u64) -> Option<Warning> {
         let known = watch.warnings.len();
-        watch.end(time, number);
+        watch.end(time, number, true);
         watch.warnings.get(known).cloned()
     }
 
@@ -444,6 +473,32 @@ mod tests {
         let mut watch = Watch::default();
         told(&mut watch, &lost(0.07, Cause::Step));
         assert_eq!(last(&mut watch, 0.1, 1), None, "less than 2 %");
+    }
+
+    #[test]
+    fn energy_that_goes_and_comes_back_is_told_at_the_end() {
+        let ended = |balances: &[f64], has_inertia| {
+            let mut watch = Watch::default();
+            for (k, &balance) in balances.iter().enumerate() {
+                let at = step(k as u64 + 1);
+                told(
+                    &mut watch,
+                    &Watched { energies: Energies { balance, ..at.energies }, cause: Cause::Obstacle, ..at },
+                );
+            }
+            let told = watch.warnings.len();
+            watch.end(2.0, balances.len() as u64, has_inertia);
+            watch.warnings[told..].iter().map(|one| (one.kind, one.message.clone())).collect::<Vec<_>>()
+        };
+        // The energy is 4: 23 % are lost and come back.
+        let swung = [&[0.0; 12][..], &[-0.92; 5], &[0.28], &[0.0; 3]].concat();
+        let [(Kind::EnergySwung, text)] = &ended(&swung, true)[..] else { panic!("one") };
+        assert!(text.contains("between -23.0 % and +7.0 %"), "{text}");
+        assert!(ended(&swung, false).is_empty() && ended(&[0.0; 20], true).is_empty());
+        // A loss in the last steps, and one that stays below 2 %.
+        let late = |balance| [&[0.0; 12][..], &[balance; 3]].concat();
+        assert!(matches!(&ended(&late(-0.1), true)[..], [(Kind::EnergyLost, _)]));
+        assert!(ended(&late(-0.07), true).is_empty());
     }
 
     #[test]

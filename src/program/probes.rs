@@ -68,7 +68,7 @@ pub(crate) fn bound_probes<const D: usize>(scene: &Scene, simulation: &Simulatio
         };
         let per_cell = scene.bodies.get(particles.body[particles.place(particle)?] as usize)?.particles_per_cell;
         let spacing = simulation.grid.spacing / f64::from(per_cell);
-        let probe = Probe { name: probe.name.clone(), field: probe.field, place };
+        let probe = Probe { name: probe.name.clone(), field: probe.field.clone(), place };
         Some(Bound { probe, particle, distance, spacing })
     };
     scene.output.probes.iter().filter_map(bind).collect()

@@ -113,7 +113,8 @@ impl SceneArguments {
 
 /// The fields in the snapshots, in words. No other field is computed, except for probes.
 fn written(scene: &Scene) -> String {
-    let names: Vec<&str> = scene.fields().iter().map(|field| field.name()).collect();
+    let fields = scene.fields();
+    let names: Vec<&str> = fields.iter().map(|field| field.name()).collect();
     match scene.output.every {
         Some(every) => format!("{} of all particles every {every}", names.join(", ")),
         None => "no snapshots (output.every): no field is computed of all particles".into(),

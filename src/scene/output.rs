@@ -4,6 +4,7 @@ use super::body::Body;
 use super::grid::GridBox;
 use super::load::check_body;
 use crate::field::Field;
+use crate::material::internal_variable_names;
 use crate::problems::Problems;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -69,10 +70,10 @@ impl Output {
     }
 
     /// The fields of snapshots and probes, with their keys.
-    pub(super) fn asked(&self) -> Vec<(String, Field)> {
-        let fields = self.fields.iter().flatten().enumerate().map(|(i, field)| (format!("output.fields[{i}]"), *field));
+    pub(super) fn asked(&self) -> Vec<(String, &Field)> {
+        let fields = self.fields.iter().flatten().enumerate().map(|(i, field)| (format!("output.fields[{i}]"), field));
         let probes = self.probes.iter().enumerate();
-        fields.chain(probes.map(|(i, probe)| (format!("output.probes[{i}].field"), probe.field))).collect()
+        fields.chain(probes.map(|(i, probe)| (format!("output.probes[{i}].field"), &probe.field))).collect()
     }
 
     pub(super) fn check(&self, problems: &mut Problems, bodies: &[Body], grid: &GridBox) {
@@ -83,10 +84,11 @@ impl Output {
         }
         let fields = self.fields.as_deref().unwrap_or_default();
         for (i, field) in problems.few("output.fields", fields).iter().enumerate() {
-            let again = fields.iter().take(i).any(|earlier| earlier == field);
+            let again = fields.iter().take(i).any(|earlier| earlier.name() == field.name());
             let found = format_args!("{}, given before,", field.name());
             problems.require(!again, &format!("output.fields[{i}]"), found, "must be listed once");
         }
+        self.check_internal_variables(problems, bodies);
         let mut columns = HashSet::from(["time".to_owned()]);
         for (i, probe) in problems.few("output.probes", &self.probes).iter().enumerate() {
             probe.check(problems, &format!("output.probes[{i}]"), bodies, grid);
@@ -98,6 +100,22 @@ impl Output {
                 let allowed = format!("probes.csv already has a column {column:?}: choose another name");
                 let is_new = columns.insert(column);
                 problems.require(again || is_new, &path, format_args!("{:?}", probe.name), allowed);
+            }
+        }
+    }
+
+    /// Refuses names that no law has. Without all laws, such as before a library is allowed, all names pass.
+    fn check_internal_variables(&self, problems: &mut Problems, bodies: &[Body]) {
+        let laws = bodies.iter().map(|body| body.material.law(&mut Problems::default(), ""));
+        let Some(laws) = laws.collect::<Option<Vec<_>>>() else { return };
+        let known = internal_variable_names(laws.iter());
+        let allowed = match known.as_slice() {
+            [] => "must be an internal variable of a law, and no law here has one: remove it".to_owned(),
+            known => format!("must be an internal variable of a law: {}", known.join(", ")),
+        };
+        for (path, field) in self.asked() {
+            if let Field::Internal(name) = field {
+                problems.require(known.contains(&name.as_str()), &path, format_args!("{name:?}"), &allowed);
             }
         }
     }

@@ -8,7 +8,7 @@ use crate::material::Law;
 use crate::mechanics::contact::{
     Carrier, ContactPoint, FreeMotion, Surroundings, Touching, candidates, obstacle_points,
 };
-use crate::mechanics::loads::{Candidate, Contacts, Obstacle, Pose, RigidBody, SurfacePoint};
+use crate::mechanics::loads::{Candidate, Contacts, Obstacle, PointInContact, Pose, RigidBody, SurfacePoint};
 use crate::mechanics::schemes::Alphas;
 use crate::mechanics::sweep::Supports;
 use crate::mechanics::terms::{ContactForce, Step, penalties};
@@ -43,6 +43,8 @@ pub(super) struct ContactUpdate<const D: usize> {
     anchors: Vec<Vec<Vector<f64, D>>>,
     /// The new slips between bodies, by point and pair.
     slips: BTreeMap<[usize; 2], Vector<f64, D>>,
+    /// The points that touch at the end of the step.
+    touching: Vec<PointInContact<D>>,
     /// The energy stored in the contact between bodies.
     energy: f64,
     /// The work that friction takes in the step, by obstacle and by pair. A part of it is stored by elastic slip.
@@ -210,6 +212,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             obstacle.anchors.clone_from(anchors);
             (obstacle.work, obstacle.friction_loss) = (contact.work, contact.friction_loss);
         }
+        self.loads.contacts.touching.clone_from(&update.touching);
         let free = self.loads.contacts.obstacles.iter_mut().zip(&update.free);
         free.for_each(|(obstacle, body)| obstacle.free.clone_from(body));
         if let Some(between) = &mut self.loads.contacts.between {
@@ -274,6 +277,9 @@ impl<const D: usize> ContactUpdate<D> {
         contact.moment = add(contact.moment, moment(&arm, &on_other));
         contact.area += area;
         contact.depth = contact.depth.max(law.depth(y));
+        let traction = pose.rotation * law.traction(y);
+        let (pressure, gap) = (law.pressure(y), -law.depth(y));
+        self.touching.push(PointInContact { number: *number, pressure, traction, gap });
         *self.taken(*touching) -= law.slip_energy(y) * area;
     }
 

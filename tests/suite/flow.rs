@@ -334,6 +334,13 @@ fn flow_has_the_same_bits_for_any_threads_and_after_a_restart() -> Result<(), Fa
             let kept = |&p: &u32| place.map_or(0.0, |place| particles.memory[p as usize * width + place]);
             assert_eq!(shown, solid.iter().map(kept).collect::<Vec<_>>());
             assert_eq!(shown.iter().any(|x| *x > 0.0), place.is_some());
+            let internal = Field::Internal(name.to_owned()).values(&continued, &Reference::of(&continued));
+            match place {
+                Some(_) => assert_eq!(internal?, shown),
+                None => {
+                    assert!(internal.expect_err("no law has it").to_string().contains("the laws have dissipated, "))
+                }
+            }
         }
         let folder = tempfile::tempdir()?;
         Recorder::start(output(folder.path()), &start, Reference::of(&start))?;

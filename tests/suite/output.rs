@@ -1,6 +1,6 @@
 //! The output files of a run agree with the simulation and with each other.
 
-use crate::support::{Failure, body, output};
+use crate::support::{Failure, body, built, output, solid};
 use bfree::approximation::{Approximation, Linear};
 use bfree::clock::Clock;
 use bfree::field::Field;
@@ -249,6 +249,51 @@ fn the_snapshots_of_a_run_agree_with_it() -> Result<(), Failure> {
     assert_eq!(names, ["stress", "body", "displacement"], "what was asked for, and nothing else");
     assert_eq!(last.arrays[0].values, Field::Stress.values(&run.simulation, &reference)?);
     assert_eq!(last.arrays[2].values, Field::Displacement.values(&run.simulation, &reference)?);
+    Ok(())
+}
+
+/// Two blocks on a floor, pressed by 1 % between smooth walls: the pressure is the same on the floor and on both sides between the blocks.
+#[test]
+fn snapshots_of_surfaces_have_the_pressure_and_the_gap_of_contact() -> Result<(), Failure> {
+    let block = |name, min: f64, max: f64| solid(name, 1000, json!({ "box": { "min": [0, min], "max": [2, max] } }));
+    let scene = json!({
+        "grid": { "size": [2, 2.25], "spacing": 0.25 },
+        "time": { "scheme": "none", "step": 0.5, "end": 1 },
+        "bodies": [block("lower", 0.25, 1.25), block("upper", 1.25, 2.25)],
+        "boundary": { "left": "sliding", "right": "sliding", "top": { "displacement": [[0, [null, 0]], [1, [null, -0.02]]] } },
+        "obstacles": [{ "name": "floor", "shape": { "half_space": { "point": [0, 0.25], "normal": [0, 1] } } }],
+        "contact": {}
+    });
+    let (mut simulation, directory) = (built::<2>(&scene)?, tempfile::tempdir()?);
+    let (end_time, reference) = (1.0, Reference::of(&simulation));
+    let settings = OutputSettings { snapshot_every: Some(1.0), end_time, ..output(directory.path()) };
+    let mut recorder = Recorder::start(settings, &simulation, reference)?;
+    let mut force = Vector::zeros();
+    for _ in 0..2 {
+        let step = simulation.advance()?;
+        recorder.record(&simulation, &step)?;
+        force = step.obstacles[0].force;
+    }
+    recorder.finish(&simulation, &Map::new(), Outcome::Finished)?;
+    let surfaces = Snapshot::read(&directory.path().join("contacts_000001.vtu"))?;
+    let of = |name: &str| surfaces.arrays.iter().find(|array| array.name == name).map(|array| array.values.clone());
+    let [Some(pressure), Some(traction), Some(gap), Some(area)] = ["pressure", "traction", "gap", "area"].map(of)
+    else {
+        return Err("an array is missing".into());
+    };
+    let expected = -force[1] / 2.0;
+    assert!(expected > 5.0, "the blocks are pressed: {expected}");
+    let (mut on_floor, mut between) = (0.0, 0.0);
+    for (k, x) in surfaces.points.iter().enumerate() {
+        let touches = pressure[k] > 0.0;
+        assert_eq!((gap[k] < 0.0, traction[3 * k + 1] != 0.0), (touches, touches), "{x:?}");
+        assert!(!touches || (pressure[k] / expected - 1.0).abs() < 1e-6, "{x:?}: {} for {expected}", pressure[k]);
+        on_floor += if x[1] < 0.3 { traction[3 * k + 1] * area[k] } else { 0.0 };
+        between += if touches && x[1] > 0.3 { area[k] } else { 0.0 };
+        assert!(touches || gap[k] > 0.0, "{x:?}");
+    }
+    assert!((on_floor / -force[1] - 1.0).abs() < 1e-9, "{on_floor} {force}");
+    assert!((between / 4.0 - 1.0).abs() < 1e-9, "both sides between the blocks: {between}");
     Ok(())
 }
 

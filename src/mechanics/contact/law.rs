@@ -89,7 +89,7 @@ impl<const D: usize> ContactLaw<D> {
     }
 
     /// p
-    fn pressure<T: Real>(&self, y: &Vector<T, D>) -> T {
+    pub fn pressure<T: Real>(&self, y: &Vector<T, D>) -> T {
         let Some((before, after)) = self.gaps(y) else { return self.feature.at(y).distance * T::lit(-self.stiffness) };
         let half = T::lit(0.5 * self.stiffness);
         match (before.value() < 0.0, after.value() < 0.0) {

@@ -11,6 +11,8 @@ pub struct Contacts<const D: usize> {
     pub points: Vec<SurfacePoint<D>>,
     /// The points that were added since the start, in their order.
     pub(crate) added: Vec<Added<D>>,
+    /// The points that touch at the end of the last step.
+    pub(crate) touching: Vec<PointInContact<D>>,
     /// The rigid obstacles.
     pub obstacles: Vec<Obstacle<D>>,
     /// Contact between bodies; `None` if bodies stick to each other where they share nodes.
@@ -42,6 +44,19 @@ pub(crate) enum Added<const D: usize> {
     Half { number: usize, axis: usize },
     /// A particle where the surface has opened: its id, the reference normal and the reference area.
     Bare { id: u32, normal: Vector<f64, D>, area: f64 },
+}
+
+/// A point of a surface that touches an obstacle or another body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct PointInContact<const D: usize> {
+    /// The number of the point in [`Contacts::points`].
+    pub number: usize,
+    /// The pressure, per reference area.
+    pub pressure: f64,
+    /// The traction on the body of the point, in space and per reference area.
+    pub traction: Vector<f64, D>,
+    /// The gap, < 0.
+    pub gap: f64,
 }
 
 /// Two bodies that may touch.

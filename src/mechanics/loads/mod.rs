@@ -12,7 +12,7 @@ pub(crate) mod rigid_body;
 mod rotation;
 
 pub(crate) use at_surface::at_surface_points;
-pub(crate) use contacts::Added;
+pub(crate) use contacts::{Added, PointInContact};
 pub use contacts::{BodyContact, Candidate, Contacts, Pair, Share};
 pub use curve::{Curve, CurveError};
 pub use force_field::{Field, ForceField};

@@ -42,6 +42,8 @@ pub(super) struct Panel {
     pub x: (&'static str, bool),
     /// Name of the vertical axis.
     pub y: String,
+    /// Smallest length of the vertical axis.
+    pub least: f64,
     /// A line of text above the panel; none if it is empty.
     pub caption: String,
     pub lines: Vec<Line>,
@@ -52,7 +54,15 @@ pub(super) struct Panel {
 impl Panel {
     /// A panel over time.
     pub(super) fn over_time(y: &str, lines: Vec<Line>) -> Self {
-        Self { x: ("time", false), y: y.to_owned(), caption: String::new(), lines, share: 1.0 }
+        Self { x: ("time", false), y: y.to_owned(), least: 0.0, caption: String::new(), lines, share: 1.0 }
+    }
+
+    /// The range of the vertical axis.
+    pub(super) fn upright(&self) -> (f64, f64) {
+        let values = self.lines.iter().flat_map(|line| &line.points).map(|point| point.1);
+        let (low, high) = range(values, 0.06);
+        let air = 0.5 * (self.least - (high - low)).max(0.0);
+        (low - air, high + air)
     }
 
     /// Largest absolute value of the finite values.
@@ -96,8 +106,8 @@ pub(super) fn draw(heading: &Heading, height: f64, panels: &[Panel]) -> String {
     let mut svg = heading.picture(WIDTH, height);
     let mut top = Heading::HEIGHT;
     let spans = |panel: &Panel| {
-        let points = || panel.lines.iter().flat_map(|line| &line.points);
-        (range(points().map(|point| point.0), 0.0), range(points().map(|point| point.1), 0.06))
+        let points = panel.lines.iter().flat_map(|line| &line.points);
+        (range(points.map(|point| point.0), 0.0), panel.upright())
     };
     let shares: f64 = panels.iter().map(|panel| panel.share).sum();
     let captions = panels.iter().filter(|panel| !panel.caption.is_empty()).count() as f64 * 20.0;

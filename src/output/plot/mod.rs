@@ -1,4 +1,4 @@
-//! Pictures of a finished (or killed) run: energies, momentum, probes, reactions, iterations, Newton's convergence, and the particles of
+//! Pictures of a finished (or killed) run: energies, momentum, probes, reactions, forces of contact, iterations, Newton's convergence, and the particles of
 //! the last snapshot. The page `report.html` shows the charts, the numbers of the run and a player of its snapshots. The page needs no
 //! other file.
 //!
@@ -40,7 +40,16 @@ use std::path::{Path, PathBuf};
 use table::Columns;
 
 /// Names of all possible pictures.
-const PICTURES: [&str; 7] = ["energies", "momentum", "iterations", "convergence", "probes", "reactions", "particles"];
+const PICTURES: [&str; 9] =
+    ["energies", "momentum", "iterations", "convergence", "probes", "reactions", "obstacles", "contacts", "particles"];
+
+/// The tables that become pictures, and their titles.
+const TABLES: [(&str, &str); 4] = [
+    ("probes", "Probes"),
+    ("reactions", "Reactions: forces of walls and regions on the bodies"),
+    ("obstacles", "Obstacles: forces of the bodies on them"),
+    ("contacts", "Contact: forces of the first body on the second"),
+];
 
 /// Height of a picture, in SVG units.
 const HEIGHT: f64 = 640.0;
@@ -84,8 +93,8 @@ pub(crate) fn is_picture(file: &str) -> bool {
 
 /// Draws the results in the directory of a run, as `.svg` and `.png` in the same directory. Returns the files written.
 ///
-/// The pictures are `energies`, `momentum` and `iterations`, and `convergence` once there are steps. A run that has probes, reactions or
-/// snapshots also gets `probes`, `reactions` or `particles`. A picture in which all values are round-off is left out. The page
+/// The pictures are `energies`, `momentum` and `iterations`, and `convergence` once there are steps. A run that has probes, reactions,
+/// obstacles, pairs of bodies that touched, or snapshots also gets `probes`, `reactions`, `obstacles`, `contacts` or `particles`. A picture in which all values are round-off is left out. The page
 /// `report.html` holds the charts and a player of the snapshots.
 ///
 /// ```
@@ -185,12 +194,19 @@ fn charts(directory: &Path, report: &Value) -> Result<Vec<(&'static str, String)
     if let Some(panel) = momentum(&history, report)? {
         draw("momentum", "Momentum", HEIGHT, &[panel]);
     }
-    for (name, title) in [("probes", "Probes"), ("reactions", "Reactions: forces of walls and regions on the bodies")] {
+    for (name, title) in TABLES {
         let path = directory.join(format!("{name}.csv"));
         if !path.is_file() {
             continue;
         }
-        let (panels, left_out) = histories::panels(&Columns::read(path)?, |panel| quantity(report, name, panel))?;
+        let table = if name == "contacts" { history.of_pairs(path)? } else { Columns::read(path)? };
+        // Of an obstacle, the columns without a name of their own are the force.
+        let shown = |panel: &str| name != "obstacles" || table.has(&format!("{panel}_area"));
+        let quantity = |panel: &str| quantity(report, name, panel);
+        let (mut panels, left_out) = histories::panels(&table, shown, quantity)?;
+        if name != "probes" {
+            histories::on_one_scale(&mut panels, quantity);
+        }
         if !panels.is_empty() {
             draw(name, &format!("{title}{left_out}"), 110.0 + 190.0 * panels.len() as f64, &panels);
         }

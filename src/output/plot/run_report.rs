@@ -24,9 +24,9 @@ pub(super) fn has_inertia(report: &Value) -> bool {
     Parameters::deserialize(&report["settings"]["time"]["scheme"]).map_or(true, |scheme| scheme.has_inertia())
 }
 
-/// The quantity of a panel of probes or reactions. Panels of the same quantity have the same scale.
+/// The quantity of a panel of probes or forces. Panels of the same quantity have the same scale.
 pub(super) fn quantity(report: &Value, table: &str, panel: &str) -> String {
-    if table == "reactions" {
+    if table != "probes" {
         return if panel.ends_with("_torque") { "torque" } else { "force" }.to_owned();
     }
     let probes = report["settings"]["output"]["probes"].as_array();

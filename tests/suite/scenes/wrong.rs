@@ -78,6 +78,7 @@ const WRONG_VALUES: &str = r##"
 "every": 0.1 => "every": 0 | output.every | 0 is not | > 0
 "checkpoint": 0.2 => "checkpoint": 0 | output.checkpoint | 0 is not | > 0
 ["velocity", "stress"] => ["stress", "stress"] | output.fields[1] | once | stress, given before
+["velocity", "stress"] => ["stress", {"internal": "damage"}] | output.fields[1] | no law here has one | "damage"
 "name": "mid" => "name": "tip" | output.probes[1].name | differ
 "name": "mid", "field": "velocity" => "name": "tip_xx", "field": "jacobian" | output.probes[1].name | tip_xx | already has a column
 "name": "mid", "field": "velocity" => "name": "time", "field": "jacobian" | output.probes[1].name | already has a column "time"

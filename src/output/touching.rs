@@ -1,0 +1,48 @@
+//! Pressure, traction and gap at every point of the surfaces that may touch, for ParaView: `contacts_*.vtu`.
+
+use super::fields::padded;
+use super::vtu::{Array, Snapshot};
+use crate::material::Law;
+use crate::simulation::Simulation;
+
+/// The points of the surfaces at the time of the snapshot `particles`. A point that touches nothing has no pressure; its gap is that to the
+/// nearest obstacle, and NaN without obstacles.
+pub(super) fn snapshot<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, particles: &Snapshot) -> Snapshot {
+    let (contacts, of) = (&simulation.loads.contacts, &simulation.particles);
+    let time = simulation.clock.time();
+    let poses: Vec<_> = contacts.obstacles.iter().map(|obstacle| obstacle.pose(time)).collect();
+    let count = contacts.points.len();
+    let (mut pressure, mut traction, mut gap) = (vec![0.0; count], vec![[0.0; 3]; count], vec![f64::NAN; count]);
+    for (point, gap) in contacts.points.iter().zip(&mut gap) {
+        let x = &of.position[point.particle];
+        let obstacles = contacts.obstacles.iter().zip(&poses);
+        let distances = obstacles.map(|(obstacle, pose)| obstacle.shape.signed_distance(&pose.to_frame(x)));
+        *gap = distances.fold(f64::NAN, f64::min);
+    }
+    for one in &contacts.touching {
+        let sum = padded(&one.traction);
+        (0..3).for_each(|k| traction[one.number][k] += sum[k]);
+        pressure[one.number] += one.pressure;
+        gap[one.number] = gap[one.number].min(one.gap);
+    }
+    let scalar = |name: &str, values: Vec<f64>, is_index| Array {
+        name: name.to_owned(),
+        components: vec![String::new()],
+        values,
+        is_index,
+    };
+    let body = contacts.points.iter().map(|point| f64::from(of.body[point.particle])).collect();
+    let area = contacts.points.iter().map(|point| point.area).collect();
+    let arrays = vec![
+        scalar("pressure", pressure, false),
+        Array {
+            components: ["x", "y", "z"].map(str::to_owned).to_vec(),
+            ..scalar("traction", traction.concat(), false)
+        },
+        scalar("gap", gap, false),
+        scalar("area", area, false),
+        scalar("body", body, true),
+    ];
+    let points = contacts.points.iter().map(|point| padded(&of.position[point.particle])).collect();
+    Snapshot { time: particles.time, background: particles.background, points, arrays, corners: 1 }
+}
