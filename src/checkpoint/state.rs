@@ -52,7 +52,8 @@ pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) 
         dilatation,
         reference,
     } = particles;
-    let mut arrays: Vec<NamedArray<'_>> = vec![
+    let mut arrays = of_history(history, loads.prescribed.len());
+    arrays.extend([
         ("id", id.iter().map(|&id| f64::from(id)).collect()),
         ("position", numbers(position)),
         ("velocity", numbers(velocity)),
@@ -64,7 +65,7 @@ pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) 
         ("dissipated", std::slice::from_ref(dissipated).into()),
         ("path", vec![*load, *increment, *speed, *weight].into()),
         ("contacts", contact_state(&loads.contacts).into()),
-    ];
+    ]);
     if loads.contacts.exist() {
         arrays.extend([
             ("slips", slips(&loads.contacts).into()),
@@ -79,7 +80,6 @@ pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) 
             ("reference_dilatation", numbers(dilatation)),
         ]);
     }
-    arrays.extend(of_history(history, loads.prescribed.len()));
     arrays
 }
 

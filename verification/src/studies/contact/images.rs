@@ -103,8 +103,16 @@ impl Image {
     }
 }
 
-/// The momentum of every body, in the order of the scene; `None` if a step is refused.
-fn momenta(image: &Image, scene: &Scene) -> Result<Option<Vec<Point>>, StudyError> {
+/// The end of a scene.
+struct End {
+    /// The momentum of every body, in the order of the scene.
+    momenta: Vec<Point>,
+    /// The difference of the dissipated energy from the sum of the friction losses over obstacles and pairs, relative to it.
+    books: f64,
+}
+
+/// Runs an image of a scene; `None` if a step is refused.
+fn end(image: &Image, scene: &Scene) -> Result<Option<End>, StudyError> {
     let mut simulation: Simulation<2> = built(&image.of(scene))?;
     for _ in 0..STEPS {
         if simulation.advance().is_err() {
@@ -118,7 +126,9 @@ fn momenta(image: &Image, scene: &Scene) -> Result<Option<Vec<Point>>, StudyErro
         [sum[0], sum[1]]
     };
     let place = |body: usize| image.order.iter().position(|&one| one == body).unwrap_or(body);
-    Ok(Some((0..scene.bodies.len()).map(|body| of(place(body))).collect()))
+    let (dissipated, losses) = (simulation.dissipated, simulation.loads.contacts.friction_loss());
+    let books = if dissipated == losses { 0.0 } else { (dissipated - losses).abs() / dissipated };
+    Ok(Some(End { momenta: (0..scene.bodies.len()).map(|body| of(place(body))).collect(), books }))
 }
 
 pub(super) fn report(effort: &Effort) -> Result<Report, StudyError> {
@@ -127,15 +137,18 @@ pub(super) fn report(effort: &Effort) -> Result<Report, StudyError> {
     let mut report = Report::new(title, &["seed", "image"]);
     for seed in 1..=count {
         let scene = scene(&mut Random::new(seed));
-        let first = momenta(&IDENTITY, &scene)?;
+        let first = end(&IDENTITY, &scene)?;
         for image in &IMAGES {
-            let other = momenta(image, &scene)?;
+            let other = end(image, &scene)?;
             let labels = [&seed.to_string(), image.name];
             let (Some(one), Some(other)) = (&first, &other) else {
                 // A refused step is refused in every image.
                 report.push(&labels, f64::from(u8::from(first.is_some() != other.is_some())), Bound::AtMost(0.0));
                 continue;
             };
+            // The sum over steps and that over contacts differ by their order.
+            report.push(&[&seed.to_string(), &format!("{}: books", image.name)], other.books, Bound::AtMost(1e-12));
+            let (one, other) = (&one.momenta, &other.momenta);
             let norm = |[x, y]: Point| x.hypot(y);
             let scale = one.iter().map(|&p| norm(p)).fold(0.0, f64::max);
             let apart = one.iter().zip(other).map(|(&one, other)| {
@@ -146,5 +159,6 @@ pub(super) fn report(effort: &Effort) -> Result<Report, StudyError> {
         }
     }
     report.note("Bound: the tolerance of Newton's method, 1e-12, times the growth of a difference in 30 steps with impacts.");
+    report.note("Books: the dissipated energy less the friction losses of all obstacles and pairs, relative to it.");
     Ok(report)
 }
