@@ -40,7 +40,7 @@ impl Outcome {
 }
 
 /// An error that ends a study, such as an error of its simulations.
-pub type StudyError = Box<dyn std::error::Error>;
+pub type StudyError = Box<dyn std::error::Error + Send + Sync>;
 
 /// A study.
 #[derive(Clone, Copy, Debug)]

@@ -6,6 +6,7 @@ use crate::random::Random;
 use crate::report::{Bound, Report};
 use bfree::simulation::Simulation;
 use bfree::tensor::Vector;
+use rayon::prelude::*;
 use serde_json::{Value, json};
 
 const SIZE: f64 = 5.0;
@@ -135,11 +136,13 @@ pub(super) fn report(effort: &Effort) -> Result<Report, StudyError> {
     let count = if *effort == Effort::Full { 60 } else { 1 };
     let title = "random scenes with contact and their images: largest difference of a momentum, over the largest momentum";
     let mut report = Report::new(title, &["seed", "image"]);
-    for seed in 1..=count {
+    let run = |seed: u64| {
         let scene = scene(&mut Random::new(seed));
-        let first = end(&IDENTITY, &scene)?;
-        for image in &IMAGES {
-            let other = end(image, &scene)?;
+        let others = IMAGES.iter().map(|image| end(image, &scene));
+        Ok::<_, StudyError>((seed, end(&IDENTITY, &scene)?, others.collect::<Result<Vec<_>, _>>()?))
+    };
+    for (seed, first, others) in (1..=count).into_par_iter().map(run).collect::<Result<Vec<_>, _>>()? {
+        for (image, other) in IMAGES.iter().zip(others) {
             let labels = [&seed.to_string(), image.name];
             let (Some(one), Some(other)) = (&first, &other) else {
                 // A refused step is refused in every image.

@@ -4,6 +4,7 @@ use super::{Effort, StudyError, built};
 use crate::report::{Bound, Report};
 use bfree::simulation::Simulation;
 use bfree::tensor::Vector;
+use rayon::prelude::*;
 use serde_json::{Value, json};
 
 /// The undrained shear strength.
@@ -52,12 +53,12 @@ fn driven(tip: &str, spacing: f64) -> Result<[f64; 2], StudyError> {
 
 pub(super) fn report(effort: &Effort) -> Result<Report, StudyError> {
     let mut report = Report::new("piles two widths into clay", &["tip", "h", "quantity"]);
-    let cases: &[(&str, f64)] = match effort {
+    let cases: &[(&'static str, f64)] = match effort {
         Effort::Full => &[("flat", 0.25), ("round", 0.25), ("wedge", 0.25), ("flat", 0.125)],
         _ => &[("flat", 0.5)],
     };
-    for &(tip, spacing) in cases {
-        let [factor, deepest] = driven(tip, spacing)?;
+    let run = |&(tip, spacing): &(&'static str, f64)| Ok::<_, StudyError>((tip, spacing, driven(tip, spacing)?));
+    for (tip, spacing, [factor, deepest]) in cases.par_iter().map(run).collect::<Result<Vec<_>, _>>()? {
         report.push(&[tip, &spacing.to_string(), "deepest particle in h"], deepest, Bound::AtMost(0.1));
         if tip == "flat" {
             let prandtl = 2.0 + std::f64::consts::PI;

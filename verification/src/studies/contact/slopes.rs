@@ -4,6 +4,7 @@ use super::{Effort, StudyError, built};
 use crate::random::Random;
 use crate::report::{Bound, Report};
 use bfree::simulation::Simulation;
+use rayon::prelude::*;
 use serde_json::{Value, json};
 
 const GRAVITY: f64 = 10.0;
@@ -94,24 +95,28 @@ pub(super) fn reports(effort: &Effort) -> Result<Vec<Report>, StudyError> {
     let (count, stiffest) = if full { (200, 8.0) } else { (2, 6.5) };
     let mut rest = Report::new("random blocks below 0.99 of Coulomb's limit, one second after the load is on", &["seed", "quantity"]);
     let mut slide = Report::new("random blocks above 1.01 of Coulomb's limit: error of the acceleration over g sin θ", &["seed"]);
-    for seed in 1..=count {
+    let resting = |seed: u64| {
         let mut random = Random::new(seed);
         let used = random.between(0.3, 0.99);
         let block = block(&mut random, used, stiffest);
-        let run = run(&block, 1.0)?;
-        let name = seed.to_string();
-        rest.push(&[&name, "way over length"], run.way.abs() / block.length, Bound::AtMost(1e-3));
+        Ok::<_, StudyError>((seed.to_string(), run(&block, 1.0)?, block.length))
+    };
+    for (name, run, length) in (1..=count).into_par_iter().map(resting).collect::<Result<Vec<_>, _>>()? {
+        rest.push(&[&name, "way over length"], run.way.abs() / length, Bound::AtMost(1e-3));
         rest.push(&[&name, "force below that at rest"], 1.0 - run.force[0], Bound::AtMost(0.05));
         rest.push(&[&name, "force above that at rest"], run.force[1] - 1.0, Bound::AtMost(0.05));
         rest.push(&[&name, "friction gives back"], run.regained, Bound::AtMost(0.0));
     }
-    for seed in 1..=count.min(100) {
+    let sliding = |seed: u64| {
         let mut random = Random::new(1000 + seed);
         let used = random.between(1.01, 3.0);
         let block = block(&mut random, used, stiffest);
         let run = run(&block, (2.0 / block.acceleration).sqrt().min(1.0))?;
         let of_slope = block.acceleration / (1.0 - 1.0 / used);
-        slide.push(&[&seed.to_string()], (run.acceleration - block.acceleration).abs() / of_slope, Bound::AtMost(0.02));
+        Ok::<_, StudyError>((seed.to_string(), (run.acceleration - block.acceleration).abs() / of_slope))
+    };
+    for (name, error) in (1..=count.min(100)).into_par_iter().map(sliding).collect::<Result<Vec<_>, _>>()? {
+        slide.push(&[&name], error, Bound::AtMost(0.02));
     }
     rest.note("Bounds: issue 52 of the project.");
     slide.note("Bound: issue 52 of the project. A sliding block of an elastic solid flutters without damping (the manual, obstacles.md).");
