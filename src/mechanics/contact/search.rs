@@ -12,6 +12,7 @@ use crate::grid::Grid;
 use crate::mechanics::loads::{BodyContact, Candidate, Contacts, Pair, Share, SurfacePoint};
 use crate::particles::Particles;
 use crate::tensor::{Tensor, Vector, cofactor, identity, inverse};
+use std::cell::OnceCell;
 use std::collections::{BTreeMap, HashMap};
 
 /// The search reaches this many grid spacings.
@@ -173,6 +174,9 @@ pub(crate) fn swallowed<const D: usize>(
 struct Near<'a, const D: usize> {
     grid: &'a Grid<D>,
     cells: HashMap<u64, Vec<&'a Place<D>>>,
+    /// The results of [`Self::deepest`] and [`Self::edge`] by the number of the place. Many points see the same place.
+    deepest: Vec<OnceCell<f64>>,
+    edges: Vec<OnceCell<f64>>,
 }
 
 impl<'a, const D: usize> Near<'a, D> {
@@ -183,6 +187,10 @@ impl<'a, const D: usize> Near<'a, D> {
 
     /// The largest depth at a point that is not nearer to the far side of its body.
     fn deepest(&self, place: &Place<D>) -> f64 {
+        *self.deepest[place.number].get_or_init(|| self.deepest_anew(place))
+    }
+
+    fn deepest_anew(&self, place: &Place<D>) -> f64 {
         let depth = |far: &Place<D>| place.normal.dot(&(place.ends[0] - far.ends[0]));
         let behind = |far: &&Place<D>| {
             let along = (place.ends[0] - far.ends[0]) - place.normal * depth(far);
@@ -229,6 +237,10 @@ impl<'a, const D: usize> Near<'a, D> {
 
     /// How near a point is to a convex edge of its body: 1 at the edge, 0 from half a cell on.
     fn edge(&self, place: &Place<D>) -> f64 {
+        *self.edges[place.number].get_or_init(|| self.edge_anew(place))
+    }
+
+    fn edge_anew(&self, place: &Place<D>) -> f64 {
         let [smooth, sharp] = EDGE;
         let of = |other: &Place<D>| {
             let apart = other.ends[0] - place.ends[0];
@@ -262,7 +274,8 @@ fn search<'a, const D: usize>(
         let mut others = boxes.iter().filter(|(body, _)| pair(place, **body).is_some());
         others.any(|(_, [low, high])| (0..D).all(|k| low[k] <= place.ends[0][k] && place.ends[0][k] <= high[k]))
     };
-    let mut near = Near { grid, cells: HashMap::new() };
+    let unknown = || vec![OnceCell::new(); places.len()];
+    let mut near = Near { grid, cells: HashMap::new(), deepest: unknown(), edges: unknown() };
     for place in places.iter().filter(is_near) {
         if let Some(cell) = grid.cell(&place.ends[0]) {
             near.cells.entry(grid.id(cell)).or_default().push(place);
