@@ -127,6 +127,9 @@ pub struct Seconds {
     /// Seconds before the first step: reading the scene, filling bodies with particles.
     #[serde(default)]
     pub set_up: f64,
+    /// Seconds in which rows and snapshots are computed and written.
+    #[serde(default)]
+    pub output: f64,
     /// Seconds of the whole run: set-up, steps, failed attempts, output.
     pub total: f64,
 }
@@ -147,10 +150,10 @@ impl Seconds {
         self.phases.iter_mut().zip(watch.seconds()).for_each(|(sum, seconds)| *sum += seconds);
     }
 
-    /// The set-up, the phases by name, and `other`: the remaining seconds.
+    /// The set-up, the phases by name, the output, and `other`: the remaining seconds, such as those of checkpoints.
     pub fn named(&self) -> impl Iterator<Item = (&'static str, f64)> + '_ {
-        let other = self.total - self.set_up - self.phases.iter().sum::<f64>();
+        let other = self.total - self.set_up - self.phases.iter().sum::<f64>() - self.output;
         let phases = Phase::ALL.iter().map(|phase| phase.1).zip(self.phases);
-        std::iter::once(("set_up", self.set_up)).chain(phases).chain([("other", other.max(0.0))])
+        std::iter::once(("set_up", self.set_up)).chain(phases).chain([("output", self.output), ("other", other.max(0.0))])
     }
 }

@@ -205,6 +205,7 @@ impl<const D: usize> Recorder<D> {
         simulation: &Simulation<D, L, A>,
         step: &StepReport<D>,
     ) -> Result<(), OutputError> {
+        let started = Instant::now();
         let (time, number) = (simulation.clock.time(), simulation.clock.steps());
         let settings = &simulation.settings;
         self.so_far.counts.add(step);
@@ -248,6 +249,7 @@ impl<const D: usize> Recorder<D> {
         }
         self.so_far.watch.warnings[known..].iter().for_each(|warning| self.progress.warn(warning));
         self.progress.show(time, number, &cost, settings.scheme.has_inertia().then_some(energies.balance));
+        self.so_far.seconds.output += started.elapsed().as_secs_f64();
         Ok(())
     }
 
