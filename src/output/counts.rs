@@ -154,6 +154,8 @@ impl Seconds {
     pub fn named(&self) -> impl Iterator<Item = (&'static str, f64)> + '_ {
         let other = self.total - self.set_up - self.phases.iter().sum::<f64>() - self.output;
         let phases = Phase::ALL.iter().map(|phase| phase.1).zip(self.phases);
-        std::iter::once(("set_up", self.set_up)).chain(phases).chain([("output", self.output), ("other", other.max(0.0))])
+        std::iter::once(("set_up", self.set_up))
+            .chain(phases)
+            .chain([("output", self.output), ("other", other.max(0.0))])
     }
 }

@@ -222,6 +222,28 @@ fn a_ring_that_bounces_says_how_much_energy_it_lost_and_where() -> Result<(), Fa
     Ok(())
 }
 
+/// A block of height L between a soft floor with the stiffness s (Λ + 2G)/h and a wall that moves down by δ is δ h/(h + s L) deep in the floor.
+#[test]
+fn a_body_deep_in_an_obstacle_is_told_beyond_a_quarter_of_a_spacing() -> Result<(), Failure> {
+    for (parts, is_told) in [(0.24, false), (0.26, true)] {
+        let (h, stiffness) = (0.25, 0.05);
+        let moved = -parts * (h + stiffness);
+        let (_, warned, report) = ran(&json!({
+            "grid": {"size": [2, 1.5], "spacing": h}, "time": {"step": 0.25, "end": 1, "scheme": "none"}, "output": {},
+            "bodies": [{"name": "block", "density": 1, "shape": {"box": {"min": [0, 0.5], "max": [2, 1.5]}},
+                        "material": {"neo_hookean": {"young": 1000, "poisson": 0}}}],
+            "boundary": {"left": "sliding", "right": "sliding", "top": {"displacement": [[0, [null, 0]], [1, [null, moved]]]}},
+            "obstacles": [{"name": "floor", "stiffness": stiffness, "shape": {"half_space": {"point": [0, 0.500001], "normal": [0, 1]}}}]
+        }))?;
+        let depth = report["obstacles"][0]["largest_depth"].as_f64().ok_or("no depth")?;
+        assert!((depth / (parts * h) - 1.0).abs() < 0.02, "{depth}");
+        let kinds: Vec<_> =
+            report["warnings"].as_array().into_iter().flatten().map(|one| one["kind"].clone()).collect();
+        assert_eq!(kinds.contains(&"obstacle_deep".into()), is_told, "{warned}");
+    }
+    Ok(())
+}
+
 /// Two blocks with the distance `gap`. They start with velocities that separate them, or that make them collide.
 fn blocks(gap: f64, apart: f64) -> Value {
     let block = |name: &str, y: f64, v: f64| {
