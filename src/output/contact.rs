@@ -1,5 +1,6 @@
 //! Contact of bodies that share nodes: its beginning and end, the gap, and whether the bodies are pulled apart.
 
+use super::plot::rounded;
 use crate::simulation::Sharing;
 use serde::{Deserialize, Serialize};
 
@@ -70,7 +71,7 @@ impl Contact {
 
     fn pulled_says(&self, now: &Sharing) -> String {
         let [a, b] = &self.bodies;
-        let since = if self.from_start { "the start".to_owned() } else { format!("t = {}", self.since) };
+        let since = if self.from_start { "the start".to_owned() } else { format!("t = {}", rounded(self.since)) };
         let tension = now.tension.map_or_else(String::new, |tension| format!(" and a tension of {tension:.3e}"));
         format!(
             "bodies {a:?} and {b:?} share nodes since {since} and are pulled apart, at a gap of {}{tension}: while they share nodes they \
@@ -89,15 +90,15 @@ fn spacings(gap: Option<f64>) -> String {
 impl std::fmt::Display for Contact {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self { bodies: [a, b], since, until, gap: [_, gap], pulled_apart, .. } = self;
-        let gap = spacings(*gap);
-        match until {
+        let (gap, since) = (spacings(*gap), rounded(*since));
+        match until.map(rounded) {
             None => write!(f, "{a:?} and {b:?} share nodes since t = {since}, at a gap of {gap}")?,
             Some(until) => {
                 write!(f, "{a:?} and {b:?} shared nodes from t = {since} to {until}, at last at a gap of {gap}")?
             }
         }
         match pulled_apart {
-            Some(time) => write!(f, "; pulled apart at t = {time}, they stuck together"),
+            Some(time) => write!(f, "; pulled apart at t = {}, they stuck together", rounded(*time)),
             None => Ok(()),
         }
     }

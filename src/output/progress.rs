@@ -1,6 +1,7 @@
 //! Progress of a run on standard error: a bar on a terminal, a line now and then elsewhere, or lines of JSON for a program.
 
 use super::history::Cost;
+use super::plot::rounded;
 use super::report::Number;
 use super::warnings::Warning;
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -108,7 +109,7 @@ impl Progress {
                 let time = Number(*time);
                 json!({"event": "warning", "kind": kind, "time": time, "step": step, "message": message}).to_string()
             }
-            _ => format!("warning: t = {time}, step {step}: {message}"),
+            _ => format!("warning: t = {}, step {step}: {message}", rounded(*time)),
         };
         self.bar.suspend(|| line(&text));
     }

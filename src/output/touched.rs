@@ -1,5 +1,6 @@
 //! Obstacles that bodies touched during a run, and pairs of bodies that touched, for the report.
 
+use super::plot::rounded;
 use crate::simulation::ContactForces;
 use serde::{Deserialize, Serialize};
 
@@ -69,6 +70,7 @@ pub(crate) fn see<const D: usize>(
 impl std::fmt::Display for Touched {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self { name, since, until, largest_force, largest_at, largest_depth, work, friction_loss, .. } = self;
+        let [since, until, largest_at] = [since, until, largest_at].map(|time| rounded(*time));
         write!(
             f,
             "{name:?} touched from t = {since} to {until}: largest force {largest_force:.6e} at t = {largest_at}, largest depth \

@@ -138,7 +138,7 @@ pub(super) fn range(values: impl Iterator<Item = f64>, padding: f64) -> (f64, f6
 }
 
 /// A number with at most ten digits.
-pub(super) fn rounded(x: f64) -> String {
+pub(in crate::output) fn rounded(x: f64) -> String {
     let rounded: f64 = format!("{x:.9e}").parse().unwrap_or(x);
     match rounded.abs() {
         0.0 => "0".to_owned(),

@@ -29,6 +29,7 @@ use super::snapshots::obstacles_beside;
 use super::vtu::Snapshot;
 use super::{OutputError, pvd};
 use axes::extremes;
+pub(super) use axes::rounded;
 use chart::{Heading, Line, Panel};
 use colouring::Colouring;
 use histories::ROUND_OFF;
