@@ -40,6 +40,8 @@ pub struct Probe<const D: usize> {
     pub name: String,
     /// The field.
     pub field: Field,
+    /// The index of the only component that is written, in a column `name`; all components without it.
+    pub component: Option<usize>,
     /// The particle or point.
     pub place: Place<D>,
 }
@@ -119,7 +121,11 @@ pub(crate) fn row<const D: usize, L: Law, A>(
         }
         let beside = probe.beside(&simulation.particles);
         beside.iter().flatten().zip(&mut values).for_each(|(add, value)| *value += add);
-        row.extend(probe.field.columns(&probe.name, D).into_iter().zip(values.into_iter().map(cell)));
+        let cells = values.into_iter().map(cell);
+        match probe.component {
+            Some(component) => row.extend(cells.skip(component).take(1).map(|cell| (probe.name.clone(), cell))),
+            None => row.extend(probe.field.columns(&probe.name, D).into_iter().zip(cells)),
+        }
     }
     Ok(row)
 }

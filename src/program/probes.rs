@@ -40,7 +40,7 @@ impl<const D: usize> Bound<D> {
 
 impl<const D: usize> Display for Bound<D> {
     fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
-        let Self { probe: Probe { name, field, place }, particle, distance, .. } = self;
+        let Self { probe: Probe { name, field, place, .. }, particle, distance, .. } = self;
         let kept = match place {
             Place::Particle(_) => "follows",
             Place::Carried { .. } => "carried by",
@@ -68,7 +68,8 @@ pub(crate) fn bound_probes<const D: usize>(scene: &Scene, simulation: &Simulatio
         };
         let per_cell = scene.bodies.get(particles.body[particles.place(particle)?] as usize)?.particles_per_cell;
         let spacing = simulation.grid.spacing / f64::from(per_cell);
-        let probe = Probe { name: probe.name.clone(), field: probe.field.clone(), place };
+        let (name, field, component) = (probe.name.clone(), probe.field.clone(), probe.component());
+        let probe = Probe { name, field, component, place };
         Some(Bound { probe, particle, distance, spacing })
     };
     scene.output.probes.iter().filter_map(bind).collect()

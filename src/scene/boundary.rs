@@ -45,10 +45,26 @@ pub enum Face {
     Rotation(Rotation),
 }
 
-/// A motion as rows `[t, [x, y, …]]`, linear in between, from t = 0 on. A component that is null in every row is free.
+/// A motion as rows `[t, [x, y, …]]`, linear in between, from t = 0 on, or along a direction by a curve. A component that is null in every
+/// row, or in the direction, is free.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
-#[serde(transparent)]
-pub struct Table(pub Vec<Row>);
+#[serde(untagged)]
+pub enum Table {
+    /// Rows `[t, [x, y, …]]`, linear in between, from t = 0 on.
+    Rows(Vec<Row>),
+    /// A direction times a curve, such as a sine, or the ground motion of a file.
+    Along(Along),
+}
+
+/// A direction times a curve.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Along {
+    /// The direction, of any length. A component that is null is free.
+    pub direction: Vec<Option<f64>>,
+    /// The factor in time.
+    pub curve: Curve,
+}
 
 /// One row of a table: a time, and the prescribed components at that time.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
@@ -86,11 +102,19 @@ impl Face {
     /// Whether the condition moves nodes.
     pub(super) fn moves(&self) -> bool {
         match self {
-            Self::Displacement(table) | Self::Velocity(table) => {
-                table.0.iter().flat_map(|row| row.1.iter().flatten()).any(|x| *x != 0.0)
-            }
-            Self::Rotation(rotation) => rotation.angle.0.iter().any(|row| row[1] != 0.0),
+            Self::Displacement(table) | Self::Velocity(table) => table.moves(),
+            Self::Rotation(rotation) => rotation.angle.moves(),
             Self::Free | Self::Sliding | Self::Fixed | Self::Held(_) => false,
+        }
+    }
+
+    /// The curve of the motion, with its path.
+    pub(super) fn curve(&self, path: &str) -> Option<(String, &Curve)> {
+        match self {
+            Self::Displacement(table) => table.curve(&format!("{path}.displacement")),
+            Self::Velocity(table) => table.curve(&format!("{path}.velocity")),
+            Self::Rotation(rotation) => Some((format!("{path}.rotation.angle"), &rotation.angle)),
+            Self::Free | Self::Sliding | Self::Fixed | Self::Held(_) => None,
         }
     }
 
@@ -118,6 +142,17 @@ impl Face {
             Self::Rotation(rotation) => rotation.check(problems, &format!("{path}.rotation"), dimension),
         }
     }
+}
+
+/// The curves of motions with these keys, with their paths.
+pub(super) fn curves<'a>(
+    [displacement, velocity]: [&'a Option<Table>; 2],
+    rotation: &'a Option<Rotation>,
+    path: &str,
+) -> Vec<(String, &'a Curve)> {
+    let tables = [("displacement", displacement), ("velocity", velocity)].into_iter();
+    let tables = tables.filter_map(|(key, table)| table.as_ref()?.curve(&format!("{path}.{key}")));
+    tables.chain(rotation.iter().map(|one| (format!("{path}.rotation.angle"), &one.angle))).collect()
 }
 
 impl Boundary {
@@ -183,48 +218,89 @@ impl Rotation {
         check_axis(problems, path, self.axis.as_deref(), dimension);
         let path = format!("{path}.angle");
         self.angle.check(problems, &path);
-        if let Some([t, angle]) = self.angle.0.first().filter(|first| **first != [0.0, 0.0]) {
-            let allowed = "must be [0, 0]: angles are counted from the start";
-            problems.refuse(&format!("{path}[0]"), format!("[{}, {}]", Number(*t), Number(*angle)), allowed);
+        if let Curve::Rows(rows) = &self.angle {
+            if let Some([t, angle]) = rows.first().filter(|first| **first != [0.0, 0.0]) {
+                let allowed = "must be [0, 0]: angles are counted from the start";
+                problems.refuse(&format!("{path}[0]"), format!("[{}, {}]", Number(*t), Number(*angle)), allowed);
+            }
+        } else {
+            self.angle.check_start(problems, &path, "angles are counted");
         }
     }
 }
 
 impl Table {
-    fn check(&self, problems: &mut Problems, path: &str, dimension: usize) {
-        check_times(problems, path, self.0.iter().map(|row| row.0));
-        let Some(Row(start, first)) = self.0.first() else { return };
-        let allowed = "must be 0: the table starts with the simulation";
-        problems.require(*start == 0.0, &format!("{path}[0][0]"), Number(*start), allowed);
-        for (i, Row(_, row)) in self.0.iter().enumerate() {
-            if !problems.length(&format!("{path}[{i}][1]"), row.len(), dimension) {
-                continue;
-            }
-            for (k, component) in row.iter().enumerate() {
-                let path = format!("{path}[{i}][1][{k}]");
-                if let Some(x) = component {
-                    problems.number(&path, *x);
-                }
-                let as_first = first.get(k).is_none_or(|start| start.is_some() == component.is_some());
-                let found = component.map_or("null".to_owned(), |x| Number(x).to_string());
-                problems.require(as_first, &path, found, "a component must be null in every row or in none");
-            }
+    /// Whether the motion is not at rest throughout.
+    fn moves(&self) -> bool {
+        match self {
+            Self::Rows(rows) => rows.iter().flat_map(|row| row.1.iter().flatten()).any(|x| *x != 0.0),
+            Self::Along(Along { direction, curve }) => direction.iter().flatten().any(|x| *x != 0.0) && curve.moves(),
         }
-        let some = first.iter().any(Option::is_some);
-        problems.require(
-            some,
-            &format!("{path}[0][1]"),
-            "a row without numbers",
-            "must prescribe at least one component",
-        );
+    }
+
+    /// The curve along a direction, with its path.
+    fn curve(&self, path: &str) -> Option<(String, &Curve)> {
+        let Self::Along(along) = self else { return None };
+        Some((format!("{path}.curve"), &along.curve))
+    }
+
+    fn check(&self, problems: &mut Problems, path: &str, dimension: usize) {
+        match self {
+            Self::Rows(rows) => check_rows(rows, problems, path, dimension),
+            Self::Along(along) => along.check(problems, path, dimension),
+        }
     }
 
     /// Refuses displacements that do not start from zero.
     fn check_start(&self, problems: &mut Problems, path: &str) {
-        let first = self.0.first().into_iter().flat_map(|row| row.1.iter().enumerate());
+        let rows = match self {
+            Self::Rows(rows) => rows,
+            Self::Along(along) => {
+                return along.curve.check_start(problems, &format!("{path}.curve"), "displacements are counted");
+            }
+        };
+        let first = rows.first().into_iter().flat_map(|row| row.1.iter().enumerate());
         for (k, start) in first.filter_map(|(k, start)| Some((k, (*start)?))) {
             let allowed = "must be 0: displacements are counted from the start";
             problems.require(start == 0.0, &format!("{path}[0][1][{k}]"), Number(start), allowed);
         }
     }
+}
+
+impl Along {
+    fn check(&self, problems: &mut Problems, path: &str, dimension: usize) {
+        self.curve.check(problems, &format!("{path}.curve"));
+        let path = format!("{path}.direction");
+        if !problems.length(&path, self.direction.len(), dimension) {
+            return;
+        }
+        for (k, component) in self.direction.iter().enumerate() {
+            component.map(|x| problems.number(&format!("{path}[{k}]"), x));
+        }
+        let some = self.direction.iter().any(Option::is_some);
+        problems.require(some, &path, "a direction without numbers", "must prescribe at least one component");
+    }
+}
+
+fn check_rows(rows: &[Row], problems: &mut Problems, path: &str, dimension: usize) {
+    check_times(problems, path, rows.iter().map(|row| row.0));
+    let Some(Row(start, first)) = rows.first() else { return };
+    let allowed = "must be 0: the table starts with the simulation";
+    problems.require(*start == 0.0, &format!("{path}[0][0]"), Number(*start), allowed);
+    for (i, Row(_, row)) in rows.iter().enumerate() {
+        if !problems.length(&format!("{path}[{i}][1]"), row.len(), dimension) {
+            continue;
+        }
+        for (k, component) in row.iter().enumerate() {
+            let path = format!("{path}[{i}][1][{k}]");
+            if let Some(x) = component {
+                problems.number(&path, *x);
+            }
+            let as_first = first.get(k).is_none_or(|start| start.is_some() == component.is_some());
+            let found = component.map_or("null".to_owned(), |x| Number(x).to_string());
+            problems.require(as_first, &path, found, "a component must be null in every row or in none");
+        }
+    }
+    let some = first.iter().any(Option::is_some);
+    problems.require(some, &format!("{path}[0][1]"), "a row without numbers", "must prescribe at least one component");
 }

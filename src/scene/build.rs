@@ -1,5 +1,7 @@
 //! Builds a simulation from a checked scene. Here and nowhere else, the dimension becomes a type: see [`Scene::dimension`].
 
+use super::boundary;
+use super::curve::Curve;
 use super::filling::Builder;
 use super::transfer::Transfer;
 use super::vector::vector;
@@ -63,6 +65,9 @@ impl Scene {
         let other = || BuildError::at("grid", format!("does not fit {D} dimensions"));
         let grid: Grid<D> = self.grid.build().ok_or_else(other)?;
         self.shapes().iter().try_for_each(|(path, shape)| shape.read_files(path, folder))?;
+        for (path, curve) in self.curves() {
+            curve.read(folder).map_err(|error| BuildError::at(format!("{path}.file"), error))?;
+        }
         let mut problems = self.check();
         let approximation = self.shape_functions(&mut Problems::default()).filter(|_| problems.is_empty());
         let approximation = approximation.ok_or_else(|| BuildError::Values(std::mem::take(&mut problems)))?;
@@ -112,6 +117,25 @@ impl Scene {
         let obstacles = self.obstacles.iter().enumerate();
         let obstacles = obstacles.map(|(i, one)| (format!("obstacles[{i}].shape"), &one.shape));
         bodies.chain(prescribed).chain(loads).chain(obstacles).chain(initial).collect()
+    }
+
+    /// All curves, with their paths.
+    fn curves(&self) -> Vec<(String, &Curve)> {
+        let gravity = self.gravity.iter().flat_map(|gravity| {
+            let profile = gravity.profile.iter().map(|profile| ("gravity.profile.factor".to_owned(), &profile.factor));
+            gravity.curve.iter().map(|curve| ("gravity.curve".to_owned(), curve)).chain(profile)
+        });
+        let loads = self.surface_loads();
+        let loads = loads.filter_map(|(path, load)| Some((format!("{path}.curve"), load.curve.as_ref()?)));
+        let faces = self.boundary.faces().into_iter();
+        let faces = faces.filter_map(|(name, face)| face?.curve(&format!("boundary.{name}")));
+        let prescribed = self.prescribed.iter().enumerate().flat_map(|(i, one)| {
+            boundary::curves([&one.displacement, &one.velocity], &one.rotation, &format!("prescribed[{i}]"))
+        });
+        let obstacles = self.obstacles.iter().enumerate().flat_map(|(i, one)| {
+            boundary::curves([&one.displacement, &one.velocity], &one.rotation, &format!("obstacles[{i}]"))
+        });
+        gravity.chain(loads).chain(faces).chain(prescribed).chain(obstacles).collect()
     }
 
     fn settings(&self) -> Settings {

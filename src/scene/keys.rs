@@ -39,12 +39,13 @@ pub fn documented(scene: &Value) -> Vec<Key> {
     keys
 }
 
-/// Follows references. Of a key that may be null, takes the alternative that is not null.
-fn resolved(mut schema: &Value) -> &Value {
+/// Follows references. Of a key that may be null, takes the alternative that is not null; of a list or an object, the one that `value` is.
+fn resolved<'a>(mut schema: &'a Value, value: &Value) -> &'a Value {
     loop {
         let of_type = schema["$ref"].as_str().and_then(|name| name.strip_prefix("#/$defs/"));
-        let present = schema["anyOf"].as_array().and_then(|any| any.iter().find(|one| one["type"] != "null"));
-        schema = match (of_type, present) {
+        let present = || schema["anyOf"].as_array().into_iter().flatten().filter(|one| one["type"] != "null");
+        let fits = |one: &&Value| (resolved(one, value)["type"] == "array") != value.is_object();
+        schema = match (of_type, present().find(fits).or_else(|| present().next())) {
             (Some(name), _) => &SCHEMA["$defs"][name],
             (None, Some(present)) => present,
             (None, None) => return schema,
@@ -98,7 +99,7 @@ impl Audit {
         if value.is_null() && may_be_null(schema) {
             return;
         }
-        let schema = resolved(schema);
+        let schema = resolved(schema, value);
         if let Some(variants) = variants(schema) {
             return self.variant(&variants, value);
         }
@@ -194,7 +195,7 @@ fn an_object(schema: &Value) -> String {
 }
 
 fn describe(schema: &Value, value: &Value, at: &str, keys: &mut Vec<Key>) {
-    let schema = resolved(schema);
+    let schema = resolved(schema, value);
     let below = |key: &str| if at.is_empty() { key.to_owned() } else { format!("{at}.{key}") };
     let variants = variants(schema).unwrap_or_default();
     let variant = |word: &str| variants.iter().find(|(name, _)| *name == word).map(|(_, variant)| *variant);

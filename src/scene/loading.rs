@@ -1,6 +1,6 @@
 //! The loads of a scene: body forces, held faces and regions, loads on surfaces.
 
-use super::boundary::{Face, Table};
+use super::boundary::{Along, Face, Table};
 use super::filling::Builder;
 use super::load::{Loaded, Pressure, Stress, Traction};
 use super::vector::vector;
@@ -134,10 +134,18 @@ impl Table {
     fn motion<const D: usize>(&self, kind: fn(Curve) -> Motion<D>) -> Result<[Option<Motion<D>>; D], CurveError> {
         let mut motion = std::array::from_fn(|_| None);
         for (i, motion) in motion.iter_mut().enumerate() {
-            let points: Vec<[f64; 2]> = self.0.iter().filter_map(|row| Some([row.0, (*row.1.get(i)?)?])).collect();
-            if !points.is_empty() {
-                *motion = Some(kind(Curve::new(points)?));
-            }
+            let curve = match self {
+                Self::Rows(rows) => {
+                    let points: Vec<[f64; 2]> =
+                        rows.iter().filter_map(|row| Some([row.0, (*row.1.get(i)?)?])).collect();
+                    if points.is_empty() { None } else { Some(Curve::new(points)?) }
+                }
+                Self::Along(Along { direction, curve }) => {
+                    let size = direction.get(i).copied().flatten();
+                    size.map(|size| Ok::<_, CurveError>(curve.curve()?.times(size))).transpose()?
+                }
+            };
+            *motion = curve.map(kind);
         }
         Ok(motion)
     }
@@ -145,5 +153,5 @@ impl Table {
 
 /// A factor in time or space; 1 without a curve.
 fn factor(given: Option<&super::curve::Curve>) -> Result<Curve, CurveError> {
-    given.map_or_else(|| Ok(Curve::constant(1.0)), |curve| Curve::new(curve.0.clone()))
+    given.map_or_else(|| Ok(Curve::constant(1.0)), super::curve::Curve::curve)
 }

@@ -3,7 +3,7 @@
 use super::body::Body;
 use super::grid::GridBox;
 use super::load::check_body;
-use crate::field::Field;
+use crate::field::{Field, Kind};
 use crate::material::internal_variable_names;
 use crate::problems::Problems;
 use schemars::JsonSchema;
@@ -38,6 +38,8 @@ pub struct Probe {
     pub name: String,
     /// The field.
     pub field: Field,
+    /// The only component to write, such as `xy` of a stress or `y` of a displacement. Default: all components.
+    pub component: Option<String>,
     /// The body whose particles are probed. Default: all bodies.
     pub body: Option<String>,
     /// The position.
@@ -96,7 +98,7 @@ impl Output {
             let path = format!("output.probes[{i}].name");
             let allowed = "must differ from the names of the probes before";
             problems.require(!again, &path, format_args!("{:?}", probe.name), allowed);
-            for column in probe.field.columns(&probe.name, grid.dimension()) {
+            for column in probe.columns(grid.dimension()) {
                 let allowed = format!("probes.csv already has a column {column:?}: choose another name");
                 let is_new = columns.insert(column);
                 problems.require(again || is_new, &path, format_args!("{:?}", probe.name), allowed);
@@ -122,11 +124,32 @@ impl Output {
 }
 
 impl Probe {
+    /// The index of the only component to write.
+    pub fn component(&self) -> Option<usize> {
+        let component = self.component.as_ref()?;
+        self.field.kind().components().iter().position(|one| one == component)
+    }
+
+    fn columns(&self, dimension: usize) -> Vec<String> {
+        if self.component.is_some() { vec![self.name.clone()] } else { self.field.columns(&self.name, dimension) }
+    }
+
     fn check(&self, problems: &mut Problems, path: &str, bodies: &[Body], grid: &GridBox) {
         let letters = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
         let named = !self.name.is_empty() && self.name.chars().all(letters);
         let allowed = "must consist of letters, digits, _ and -: it becomes part of a file name";
         problems.require(named, &format!("{path}.name"), format_args!("{:?}", self.name), allowed);
+        if let Some(component) = &self.component {
+            let (kind, dimension) = (self.field.kind(), grid.dimension());
+            let all = kind.components();
+            let all = if kind == Kind::Vector { all.get(..dimension).unwrap_or(all) } else { all };
+            let allowed = match all {
+                [""] => format!("{} has one component: remove the key", self.field.name()),
+                _ => format!("must be a component of {}: {}", self.field.name(), all.join(", ")),
+            };
+            let known = !component.is_empty() && all.contains(&component.as_str());
+            problems.require(known, &format!("{path}.component"), format_args!("{component:?}"), allowed);
+        }
         if let Some(body) = &self.body {
             check_body(problems, &format!("{path}.body"), body, bodies);
         }

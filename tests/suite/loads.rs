@@ -2,7 +2,7 @@
 
 mod rotation;
 
-use crate::support::{Failure, advance, body, built, run_to};
+use crate::support::{Failure, advance, assert_refused, body, built, run_to};
 use bfree::approximation::{Approximation, Linear};
 use bfree::grid::Grid;
 use bfree::material::{Lame, Material, NeoHookean};
@@ -13,9 +13,11 @@ use bfree::mechanics::sweep::Supports;
 use bfree::mechanics::terms::Step;
 use bfree::mechanics::transfer::Nodal;
 use bfree::particles::Particles;
+use bfree::scene;
 use bfree::simulation::Simulation;
 use bfree::tensor::Vector;
 use serde_json::json;
+use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
 /// A body that fills a box whose four faces all follow `table`.
@@ -31,6 +33,46 @@ fn carried(table: &serde_json::Value, velocity: f64, step: f64) -> serde_json::V
         }],
         "boundary": {"left": moving, "right": moving, "bottom": moving, "top": moving}
     })
+}
+
+/// Walls with the velocity V sin 2πt have moved by V/π at t = ½.
+#[test]
+fn a_base_motion_is_a_sine_or_the_rows_of_a_file() -> Result<(), Failure> {
+    let folder = tempfile::tempdir()?;
+    let rows: String = (0..=100).map(|k| 0.01 * f64::from(k)).map(|t| format!("{t}, {}\n", (TAU * t).sin())).collect();
+    std::fs::write(folder.path().join("ground.csv"), format!("time, velocity\n{rows}"))?;
+    for curve in [json!({"sine": {"frequency": 1}}), json!({"file": "ground.csv"})] {
+        let scene = carried(&json!({"direction": [0.1, 0], "curve": curve}), 0.0, 0.01).to_string();
+        let mut simulation: Simulation<2> = scene::read(&scene, &[])?.build(folder.path())?;
+        let start = simulation.particles.by_id().position;
+        run_to(&mut simulation, 0.5)?;
+        let moved = simulation.particles.by_id().position[0][0] - start[0][0];
+        assert!((moved * PI / 0.1 - 1.0).abs() < 1e-3, "{curve}: {moved}");
+    }
+    let missing = carried(&json!({"direction": [0.1, null], "curve": {"file": "no.csv"}}), 0.0, 0.01).to_string();
+    let error = scene::read(&missing, &[])?.build::<2>(folder.path()).expect_err("no file").to_string();
+    assert!(error.starts_with("boundary.left.velocity.curve.file: cannot be read"), "{error}");
+    Ok(())
+}
+
+#[test]
+fn a_wrong_curve_is_refused_with_its_place() {
+    let with = |bottom: serde_json::Value| {
+        let mut scene = carried(&json!([[0, [0, 0]], [1, [0.1, 0]]]), 0.0, 0.01);
+        scene["boundary"] = json!({"bottom": {"displacement": bottom}});
+        scene.to_string()
+    };
+    let along = |direction: serde_json::Value, sine| with(json!({"direction": direction, "curve": {"sine": sine}}));
+    let at = "boundary.bottom.displacement";
+    let late = along(json!([1, null]), json!({"frequency": 1, "phase": 1}));
+    assert_refused(&late, &format!("{at}.curve"), &["must be 0 at t = 0", "displacements"]);
+    let still = along(json!([1, null]), json!({"frequency": 0}));
+    assert_refused(&still, &format!("{at}.curve.sine.frequency"), &["> 0"]);
+    let nowhere = along(json!([null, null]), json!({"frequency": 1}));
+    assert_refused(&nowhere, &format!("{at}.direction"), &["at least one component"]);
+    let unknown = with(json!({"direction": [1, null], "curve": {"cosine": {}}}));
+    let error = scene::read(&unknown, &[]).expect_err("unknown").to_string();
+    assert!(error.contains("unknown variant `cosine`, expected one of `sine`, `file`"), "{error}");
 }
 
 #[test]

@@ -289,8 +289,9 @@ impl Writer {
             }
             return format!("[{name}](#{})", anchor(name));
         }
-        if let Some(one) = schema["anyOf"].as_array().and_then(|any| any.iter().find(|one| one["type"] != "null")) {
-            return self.kind(one);
+        if let Some(any) = schema["anyOf"].as_array() {
+            let kinds: Vec<String> = any.iter().filter(|one| one["type"] != "null").map(|one| self.kind(one)).collect();
+            return kinds.join(" or ");
         }
         if let Some(parts) = schema["prefixItems"].as_array() {
             let parts: Vec<String> = parts.iter().map(|part| self.kind(part)).collect();

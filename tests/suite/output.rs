@@ -147,13 +147,14 @@ fn recorded() -> Result<Recorded, Failure> {
     let corner = Vector::from([1.0, 0.875]);
     let at_point = |within| Place::Nearest { point: corner, body: None, within };
     let beside = || Place::Carried { particle: 63, offset: ASIDE };
-    let probe = |name: &str, field, place| Probe { name: name.into(), field, place };
+    let probe = |name: &str, field, place| Probe { name: name.into(), field, component: None, place };
     let probes = vec![
         probe("top", Field::Displacement, Place::Particle(63)),
         probe("near", Field::Jacobian, at_point(2.0)),
         probe("beside", Field::Displacement, beside()),
         probe("there", Field::Position, beside()),
         probe("far", Field::Velocity, at_point(0.4)),
+        Probe { component: Some(1), ..probe("up", Field::Displacement, Place::Particle(63)) },
     ];
     let settings = OutputSettings { probes, ..settings(directory.path()) };
     let mut recorder = Recorder::start(settings, &simulation, Reference::of(&initial))?;
@@ -194,6 +195,7 @@ fn the_tables_of_a_run_agree_with_it() -> Result<(), Failure> {
 
     let probe = |name: &str| run.column("probes.csv", name);
     assert_eq!(probe("top_y")?[1..], run.tops);
+    assert_eq!(probe("up")?, probe("top_y")?);
     let (beside, there, start) = (probe("beside_y")?, probe("there_y")?, run.initial.particles.position[63][1]);
     assert!(run.carried.iter().any(|add| add.abs() > 1e-6), "a body that deforms");
     for (k, (top, add)) in run.tops.iter().zip(&run.carried).enumerate() {
@@ -372,7 +374,7 @@ fn settings_that_make_no_sense_are_refused_with_their_numbers() -> Result<(), Fa
         change(&mut settings);
         Recorder::start(settings, &simulation, Reference::of(&simulation)).err()
     };
-    let probe = |place| Probe { name: "p".into(), field: Field::Velocity, place };
+    let probe = |place| Probe { name: "p".into(), field: Field::Velocity, component: None, place };
     let missing = start(&|settings| settings.probes = vec![probe(Place::Particle(64))]);
     assert!(matches!(missing, Some(OutputError::ProbeParticle { particle: 64, particles: 64, .. })), "{missing:?}");
     let nowhere = Place::Nearest { point: Vector::from([f64::NAN, 0.0]), body: None, within: 1.0 };

@@ -1,6 +1,8 @@
 //! Factors in time.
 
-/// A piecewise-linear function of time, constant before its first and after its last point.
+use std::f64::consts::TAU;
+
+/// A piecewise-linear function of time, constant before its first and after its last point, or a sine.
 ///
 /// ```
 /// use bfree::mechanics::loads::Curve;
@@ -15,8 +17,37 @@
 /// # Ok::<(), bfree::mechanics::loads::CurveError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
-pub struct Curve {
-    points: Vec<[f64; 2]>,
+pub struct Curve(Kind);
+
+#[derive(Clone, Debug, PartialEq)]
+enum Kind {
+    Points(Vec<[f64; 2]>),
+    Sine(Sine),
+}
+
+/// mean + amplitude · sin(2π frequency t + phase)
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sine {
+    /// The mean.
+    pub mean: f64,
+    /// The amplitude.
+    pub amplitude: f64,
+    /// The frequency (1/time), > 0.
+    pub frequency: f64,
+    /// The phase (radians).
+    pub phase: f64,
+}
+
+impl Sine {
+    fn angle(&self, t: f64) -> f64 {
+        TAU * self.frequency * t + self.phase
+    }
+
+    /// ∫ value dt. Over a short time, the difference of the cosines is 2 sin(Δ/2) sin(middle) to the last digit.
+    fn integral(&self, from: f64, to: f64) -> f64 {
+        let (half, middle) = (0.5 * TAU * self.frequency * (to - from), 0.5 * (self.angle(from) + self.angle(to)));
+        self.mean * (to - from) + self.amplitude / (TAU * self.frequency) * 2.0 * half.sin() * middle.sin()
+    }
 }
 
 /// A list of points that does not define a curve.
@@ -41,6 +72,9 @@ pub enum CurveError {
         /// The offending point.
         index: usize,
     },
+    /// A sine with a number that is not finite, or a frequency that is not positive.
+    #[error("{0:?} must be finite, and its frequency > 0")]
+    Sine(Sine),
 }
 
 impl Curve {
@@ -60,18 +94,42 @@ impl Curve {
                 return Err(CurveError::Order { index, time: point[0], previous: points[index - 1][0] });
             }
         }
-        Ok(Self { points })
+        Ok(Self(Kind::Points(points)))
+    }
+
+    /// A sine.
+    ///
+    /// ```
+    /// use bfree::mechanics::loads::{Curve, Sine};
+    ///
+    /// // Over half a period, the integral of sin(2π f t) is 1/(π f).
+    /// let sine = Curve::sine(Sine { mean: 0.0, amplitude: 1.0, frequency: 2.0, phase: 0.0 })?;
+    /// assert!((sine.integral(0.0, 0.25) - 0.5 / std::f64::consts::PI).abs() < 1e-15);
+    /// assert_eq!((sine.value(0.0), sine.slope(0.0)), (0.0, 4.0 * std::f64::consts::PI));
+    /// # Ok::<(), bfree::mechanics::loads::CurveError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// A number that is not finite, or a frequency that is not positive.
+    pub fn sine(sine: Sine) -> Result<Self, CurveError> {
+        let Sine { mean, amplitude, frequency, phase } = sine;
+        let is_finite = [mean, amplitude, frequency, phase].iter().all(|x| x.is_finite());
+        if is_finite && frequency > 0.0 { Ok(Self(Kind::Sine(sine))) } else { Err(CurveError::Sine(sine)) }
+    }
+
+    /// The curve times a number.
+    pub fn times(self, factor: f64) -> Self {
+        Self(match self.0 {
+            Kind::Points(points) => Kind::Points(points.into_iter().map(|[t, x]| [t, factor * x]).collect()),
+            Kind::Sine(sine) => {
+                Kind::Sine(Sine { mean: factor * sine.mean, amplitude: factor * sine.amplitude, ..sine })
+            }
+        })
     }
 
     /// The constant function.
     pub fn constant(value: f64) -> Self {
-        Self { points: vec![[0.0, value]] }
-    }
-
-    /// The piece `[a, b]` that holds `t`, if `t` lies between the first and the last point.
-    fn piece(&self, t: f64) -> Option<([f64; 2], [f64; 2])> {
-        let after = self.points.partition_point(|point| point[0] <= t);
-        (after > 0 && after < self.points.len()).then(|| (self.points[after - 1], self.points[after]))
+        Self(Kind::Points(vec![[0.0, value]]))
     }
 
     /// The value at time `t`.
@@ -87,16 +145,22 @@ impl Curve {
     /// # Ok::<(), bfree::mechanics::loads::CurveError>(())
     /// ```
     pub fn value(&self, t: f64) -> f64 {
-        match self.piece(t) {
-            Some((a, b)) => a[1] + (b[1] - a[1]) * ((t - a[0]) / (b[0] - a[0])),
-            None if t < self.points[0][0] => self.points[0][1],
-            None => self.points[self.points.len() - 1][1],
+        match &self.0 {
+            Kind::Sine(sine) => sine.mean + sine.amplitude * sine.angle(t).sin(),
+            Kind::Points(points) => match piece(points, t) {
+                Some((a, b)) => a[1] + (b[1] - a[1]) * ((t - a[0]) / (b[0] - a[0])),
+                None if t < points[0][0] => points[0][1],
+                None => points[points.len() - 1][1],
+            },
         }
     }
 
     /// The slope at time `t`; at a kink, the slope of the piece after the kink.
     pub fn slope(&self, t: f64) -> f64 {
-        self.piece(t).map_or(0.0, |(a, b)| (b[1] - a[1]) / (b[0] - a[0]))
+        match &self.0 {
+            Kind::Sine(sine) => TAU * sine.frequency * sine.amplitude * sine.angle(t).cos(),
+            Kind::Points(points) => piece(points, t).map_or(0.0, |(a, b)| (b[1] - a[1]) / (b[0] - a[0])),
+        }
     }
 
     /// The slopes at the start of the step from `t` to `t + dt`, from the right, and at its end, from the left. They are evaluated slightly
@@ -107,7 +171,11 @@ impl Curve {
 
     /// ∫ value dt from `from` to `to`, exactly, kinks included.
     pub fn integral(&self, from: f64, to: f64) -> f64 {
-        let kinks = self.points.iter().map(|point| point[0]).filter(|&t| t > from && t < to);
+        let points = match &self.0 {
+            Kind::Sine(sine) => return sine.integral(from, to),
+            Kind::Points(points) => points,
+        };
+        let kinks = points.iter().map(|point| point[0]).filter(|&t| t > from && t < to);
         let mut sum = 0.0;
         let mut start = from;
         for end in kinks.chain(std::iter::once(to)) {
@@ -116,6 +184,12 @@ impl Curve {
         }
         sum
     }
+}
+
+/// The piece `[a, b]` that holds `t`, if `t` lies between the first and the last point.
+fn piece(points: &[[f64; 2]], t: f64) -> Option<([f64; 2], [f64; 2])> {
+    let after = points.partition_point(|point| point[0] <= t);
+    (after > 0 && after < points.len()).then(|| (points[after - 1], points[after]))
 }
 
 #[cfg(test)]
@@ -128,6 +202,21 @@ mod tests {
         assert_eq!(back, Err(CurveError::Order { index: 2, time: 0.5, previous: 1.0 }));
         assert_eq!(Curve::new(vec![]), Err(CurveError::Empty));
         assert_eq!(Curve::new(vec![[0.0, f64::NAN]]), Err(CurveError::NotFinite { index: 0 }));
+    }
+
+    #[test]
+    fn value_slope_and_integral_of_a_sine_agree() -> Result<(), CurveError> {
+        let sine = Curve::sine(Sine { mean: 0.3, amplitude: -2.0, frequency: 1.7, phase: 0.4 })?.times(1.5);
+        let h = 1e-5;
+        for t in [-0.3, 0.0, 0.21, 5.0] {
+            assert!(((sine.value(t + h) - sine.value(t - h)) / (2.0 * h) - sine.slope(t)).abs() < 1e-7);
+            assert!((sine.integral(t - h, t + h) / (2.0 * h) - sine.value(t)).abs() < 1e-8);
+        }
+        let part = sine.integral(0.1, 0.7) + sine.integral(0.7, 2.0);
+        assert!((part - sine.integral(0.1, 2.0)).abs() < 1e-14);
+        let slow = Sine { mean: 0.0, amplitude: 1.0, frequency: 0.0, phase: 0.0 };
+        assert_eq!(Curve::sine(slow), Err(CurveError::Sine(slow)));
+        Ok(())
     }
 
     #[test]
