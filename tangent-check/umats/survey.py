@@ -169,7 +169,10 @@ def confirmed(source, options):
     except subprocess.TimeoutExpired:
         return "no answer"
     words = done.stdout.split()
-    return f"{float(words[-1]):.0e}" if done.returncode == 0 and words else "no answer"
+    if done.returncode or not words:
+        return "no answer"
+    # Its paths may miss a few states.
+    return f"{float(words[-1]):.0e}" if float(words[-1]) > 1e-7 else "not seen"
 
 
 def main():
@@ -197,8 +200,9 @@ def main():
     head = f"""# Verdicts over public UMATs
 
 `tangent-check/umats/survey.py` wrote this page. Each UMAT was checked as it is, with the parameters of the input file beside it. {loaded} load of the {loaded}
-that compile without other files; {needing} others lack a file or are no Fortran that gfortran compiles. The last column is the deviation that a second program
-found, by central differences on random paths of its own.
+that compile without other files; {needing} others lack a file or are no Fortran that gfortran compiles. A deviation is relative to the greatest entry of the
+tangent. The last column is the greatest one that a second program found, which shares no code with the first, by central differences on random paths of its
+own. "Not checked" is a law that most states break, or that has no input file. "Wrong" is the verdict over the tangent, and no judgement of the stress.
 
 | UMAT | verdict | states | second program |
 |---|---|---|---|

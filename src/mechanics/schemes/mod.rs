@@ -69,8 +69,8 @@ pub enum Parameters {
     /// does not resolve.
     GeneralizedAlpha(GeneralizedAlpha),
     /// Dynamics that keep energy, momentum and angular momentum for every step length: the midpoint rule with the mean stress of the step, a
-    /// discrete gradient of the strain energy, and with the mean pressure of contact. A grid reset still loses energy. Not for laws
-    /// from libraries.
+    /// discrete gradient of the strain energy, and with the mean pressure of obstacles. A grid reset still loses energy. Not for laws
+    /// from libraries, and not with `contact`.
     EnergyMomentum,
     /// Statics: time only sets the loads and the prescribed motions.
     None,
