@@ -108,6 +108,10 @@ impl Audit {
             (Some("object"), Value::Object(object)) => self.object(schema, object),
             (Some("object"), _) => self.mismatch(&an_object(schema), value),
             (Some("array"), Value::Array(list)) => {
+                let length = schema["minItems"].as_u64().filter(|_| schema["minItems"] == schema["maxItems"]);
+                if let Some(length) = length.filter(|length| *length != list.len() as u64) {
+                    return self.say(format!("invalid length {}, expected a list of {length}", list.len()));
+                }
                 for (i, value) in list.iter().enumerate() {
                     self.within(Step::Index(i), schema["prefixItems"].get(i).unwrap_or(&schema["items"]), value);
                 }

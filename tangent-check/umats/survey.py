@@ -175,9 +175,30 @@ def confirmed(source, options):
     return f"{float(words[-1]):.0e}" if float(words[-1]) > 1e-7 else "not seen"
 
 
+def page_of(rows, reasons, repositories):
+    """The page: the laws with a verdict, and why the others have none."""
+    others = "".join(f"| {why} | {count} |\n" for why, count in sorted(reasons.items(), key=lambda item: -item[1]))
+    return f"""# Verdicts over public UMATs
+
+`tangent-check/umats/survey.py` wrote this page. Each UMAT of {repositories} was checked as it is, with the
+parameters of the input file beside it. A deviation is relative to the greatest entry of the tangent. The last column is the greatest one that a second
+program found, which shares no code with the first, by central differences on random paths of its own. "Wrong" is a verdict over the tangent for Abaqus'
+convention or small strain, whichever fits better, and no judgement of the stress: such a law may converge slowly, and still be right where it converges.
+
+| UMAT | verdict | states | second program |
+|---|---|---|---|
+{chr(10).join(rows)}
+
+{sum(reasons.values())} others have no verdict:
+
+| why | UMATs |
+|---|---|
+{others}"""
+
+
 def main():
     program, page, *folders = sys.argv[1:]
-    rows, loaded, needing, failed = [], 0, 0, 0
+    rows, reasons = [], {}
     for folder in map(Path, folders):
         for source in sorted(folder.rglob("*.[fF]*")):
             if source.suffix.lower() not in (".f", ".for", ".f90") or "src" in source.relative_to(folder).parts[:-1] and "_" in source.name[:1]:
@@ -185,11 +206,11 @@ def main():
             if not re.search(r"^[^!cC*\n]*subroutine +umat *\(", source.read_text(errors="replace"), re.I | re.M):
                 continue
             options, report, why = judged(str(Path(program).resolve()), source.resolve())
-            name = f"{folder.name.split('+')[-1]}: {source.relative_to(folder)}"
-            loaded, needing = loaded + ("needs" not in why and "compiles" not in why), needing + ("needs" in why or "compiles" in why)
             if report is None:
-                rows.append(f"| `{name}` | not checked | {why} | |")
+                kind = re.sub(r"^[^:]*\.inp: ", "its input file: ", re.sub(r"^needs .*", "needs another file", why))
+                reasons[kind] = reasons.get(kind, 0) + 1
                 continue
+            name = f"{folder.name.replace('+', '/')}: {source.relative_to(folder)}"
             judgements = [finding for finding in report["findings"] if finding["verdict"] != "not checked"]
             wrong = [finding for finding in judgements if finding["verdict"] == "wrong"]
             greatest = max((finding["deviation"] or 0 for finding in wrong), default=0)
@@ -197,17 +218,8 @@ def main():
             second = confirmed(source.resolve(), options) if wrong else ""
             rows.append(f"| `{name}` | {report['verdict']} | {words} | {second} |")
             print(rows[-1], flush=True)
-    head = f"""# Verdicts over public UMATs
-
-`tangent-check/umats/survey.py` wrote this page. Each UMAT was checked as it is, with the parameters of the input file beside it. {loaded} load of the {loaded}
-that compile without other files; {needing} others lack a file or are no Fortran that gfortran compiles. A deviation is relative to the greatest entry of the
-tangent. The last column is the greatest one that a second program found, which shares no code with the first, by central differences on random paths of its
-own. "Not checked" is a law that most states break, or that has no input file. "Wrong" is the verdict over the tangent, and no judgement of the stress.
-
-| UMAT | verdict | states | second program |
-|---|---|---|---|
-"""
-    Path(page).write_text(head + "\n".join(rows) + "\n")
+    repositories = ", ".join(f"`{Path(folder).name.replace('+', '/')}`" for folder in folders)
+    Path(page).write_text(page_of(rows, reasons, repositories))
 
 
 if __name__ == "__main__":

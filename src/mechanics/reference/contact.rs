@@ -5,13 +5,15 @@ use crate::mechanics::loads::Prescribed;
 use crate::mechanics::sweep::Supports;
 use crate::particles::Particles;
 use crate::tensor::Vector;
-use std::collections::{BTreeSet, HashMap};
+use std::cell::LazyCell;
+use std::collections::{BTreeSet, HashMap, HashSet};
 
 /// A node belongs to one body if the variance of the body index at that node, relative to its mean square, is below this tolerance.
 const ALONE: f64 = 1e-9;
 
-/// The prescribed conditions that a particle has reached. Its cell has a node of the condition that is not active yet. At the last grid
-/// reset, its cell had no node of the condition. Nodes of other nodal fields do not hold the particle.
+/// The prescribed conditions that a particle has reached. Its cell has a node of the condition that had no particle of the same nodal field
+/// in the cells around it at the last grid reset. The cell of the particle had no node of the condition then. (Wide functions make nodes
+/// active that are farther away, and hold nearly nothing of the body.)
 pub(crate) fn reached_conditions<const D: usize>(
     particles: &Particles<D>,
     prescribed: &[Prescribed<D>],
@@ -25,14 +27,21 @@ pub(crate) fn reached_conditions<const D: usize>(
         prescribed.iter().enumerate().filter(move |(_, one)| one.on.holds(grid, index, &position)).map(|(one, _)| one)
     };
     let of_cell = |cell: [u32; D], counts: &dyn Fn([u32; D]) -> bool| -> BTreeSet<usize> {
-        corners(cell).filter(|&index| counts(index)).flat_map(&holders).collect()
+        let held = |index| holders(index).filter(move |_| counts(index));
+        corners(cell).flat_map(held).collect()
     };
-    // The conditions that hold a node of a cell that is not active yet, by cell and field.
+    let occupied = LazyCell::new(|| -> HashSet<(u64, u32)> {
+        cells(at_reset.iter().enumerate().map(|(p, x)| (x, field(p))), grid).into_iter().collect()
+    });
+    // The conditions that hold a node of a cell that had no particle beside it, by cell and field.
     let of_field = |key: (u64, u32)| {
         let (cell, field) = key;
         mutant!("reference: nodes of the first field hold all bodies": field = 0);
-        let inactive = |index| nodes.number(grid.id_in(field, index)).is_none();
-        (key, of_cell(grid.index(cell), &inactive))
+        let is_new = |index| {
+            let beside = |cell: [u32; D]| occupied.contains(&(grid.id(cell), field));
+            nodes.number(grid.id_in(field, index)).is_none() || !cells_around(index).any(beside)
+        };
+        (key, of_cell(grid.index(cell), &is_new))
     };
     let new = cells(present.iter().enumerate().map(|(p, x)| (x, field(p))), grid).into_iter();
     let new: HashMap<(u64, u32), _> = new.map(of_field).collect();
@@ -128,6 +137,12 @@ fn cells<'a, const D: usize, T: Ord>(
     cells.sort_unstable();
     cells.dedup();
     cells
+}
+
+/// The cells around a node.
+fn cells_around<const D: usize>(node: [u32; D]) -> impl Iterator<Item = [u32; D]> {
+    let fits = move |by: &[u64; D]| (0..D).all(|k| u64::from(node[k]) >= by[k]);
+    indices([2; D]).filter(fits).map(move |by| std::array::from_fn(|k| node[k] - by[k] as u32))
 }
 
 /// The nodes of a cell.
