@@ -16,36 +16,43 @@ mod tangent;
 mod wedge;
 
 use super::{Effort, Outcome, StudyError};
+use crate::report::Report;
 use bfree::simulation::Simulation;
+use rayon::prelude::*;
 use serde_json::Value;
 
 /// The summary in the list of studies.
 pub(super) const ABOUT: &str = "contact with obstacles and between bodies: tangent, impact of bars, sliding and rolling, a wedge, patch test, Hertz, discs beside finite elements, the paper's disc, free obstacles, random blocks on slopes, plates and images, a dragged block, a ball that bounces";
 
+/// A part of the study.
+type Part = fn(&Effort) -> Result<Vec<Report>, StudyError>;
+
+/// The parts that run side by side, in the order of their reports.
+const PARTS: [Part; 14] = [
+    |_| tangent::reports(),
+    |effort| Ok(vec![between::impact(effort)?]),
+    |effort| Ok(vec![incline::report(effort)?]),
+    |effort| Ok(vec![between::slope(effort)?]),
+    |effort| Ok(vec![between::mirrored(effort)?]),
+    |effort| Ok(vec![disc::beside_elements(effort)?]),
+    |effort| Ok(vec![disc::of_the_paper(effort)?]),
+    |effort| Ok(vec![wedge::report(effort)?, indentation::patch()?]),
+    free::reports,
+    slopes::reports,
+    |effort| Ok(vec![piles::report(effort)?, plates::report(effort)?]),
+    |effort| Ok(vec![images::report(effort)?, cone::report(effort)?]),
+    |effort| Ok(vec![bounce::report(effort)?]),
+    |effort| match effort {
+        Effort::Full => Ok(vec![indentation::hertz()?, indentation::point()?]),
+        Effort::Short => Ok(Vec::new()),
+    },
+];
+
 pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
-    let mut reports = tangent::reports()?;
     let (of_bar, table) = bar::report(effort)?;
-    reports.push(of_bar);
-    reports.push(between::impact(effort)?);
-    reports.push(incline::report(effort)?);
-    reports.push(between::slope(effort)?);
-    reports.push(between::mirrored(effort)?);
-    reports.push(disc::beside_elements(effort)?);
-    reports.push(disc::of_the_paper(effort)?);
-    reports.push(wedge::report(effort)?);
-    reports.extend(free::reports(effort)?);
-    reports.push(indentation::patch()?);
-    reports.extend(slopes::reports(effort)?);
-    reports.push(piles::report(effort)?);
-    reports.push(plates::report(effort)?);
-    reports.push(images::report(effort)?);
-    reports.push(cone::report(effort)?);
-    reports.push(bounce::report(effort)?);
-    if *effort == Effort::Full {
-        reports.push(indentation::hertz()?);
-        reports.push(indentation::point()?);
-    }
-    Ok(Outcome { reports, tables: vec![table], ..Outcome::default() })
+    let mut parts: Vec<Vec<Report>> = PARTS.par_iter().map(|part| part(effort)).collect::<Result<_, _>>()?;
+    parts.insert(1, vec![of_bar]);
+    Ok(Outcome { reports: parts.concat(), tables: vec![table], ..Outcome::default() })
 }
 
 /// The simulation of a scene in JSON.
