@@ -11,9 +11,9 @@ use std::collections::{BTreeSet, HashMap, HashSet};
 /// A node belongs to one body if the variance of the body index at that node, relative to its mean square, is below this tolerance.
 const ALONE: f64 = 1e-9;
 
-/// The prescribed conditions that a particle has reached. Its cell has a node of the condition that had no particle of the same nodal field
-/// in the cells around it at the last grid reset. The cell of the particle had no node of the condition then. (Wide functions make nodes
-/// active that are farther away, and hold nearly nothing of the body.)
+/// The prescribed conditions that a particle has reached. Its cell has a node of the condition that is not active yet, or of a condition
+/// that had no node in any cell of the same nodal field at the last grid reset. (Wide functions make such nodes active, and they hold
+/// nearly nothing of the body.) The cell of the particle had no node of the condition then.
 pub(crate) fn reached_conditions<const D: usize>(
     particles: &Particles<D>,
     prescribed: &[Prescribed<D>],
@@ -26,21 +26,20 @@ pub(crate) fn reached_conditions<const D: usize>(
         let position = grid.position(index);
         prescribed.iter().enumerate().filter(move |(_, one)| one.on.holds(grid, index, &position)).map(|(one, _)| one)
     };
-    let of_cell = |cell: [u32; D], counts: &dyn Fn([u32; D]) -> bool| -> BTreeSet<usize> {
-        let held = |index| holders(index).filter(move |_| counts(index));
-        corners(cell).flat_map(held).collect()
+    let of_cell = |cell: [u32; D], counts: &dyn Fn([u32; D], usize) -> bool| -> BTreeSet<usize> {
+        corners(cell).flat_map(|index| holders(index).filter(move |&one| counts(index, one))).collect()
     };
-    let occupied = LazyCell::new(|| -> HashSet<(u64, u32)> {
-        cells(at_reset.iter().enumerate().map(|(p, x)| (x, field(p))), grid).into_iter().collect()
+    // The conditions that held a node of a cell at the last grid reset, with the nodal field.
+    let held = LazyCell::new(|| -> HashSet<(u32, usize)> {
+        let cells = cells(at_reset.iter().enumerate().map(|(p, x)| (x, field(p))), grid).into_iter();
+        let of_cell = |cell: u64| of_cell(grid.index(cell), &|_, _| true);
+        cells.flat_map(|(cell, field)| of_cell(cell).into_iter().map(move |one| (field, one))).collect()
     });
-    // The conditions that hold a node of a cell that had no particle beside it, by cell and field.
+    // The conditions that are new to a cell, by cell and field.
     let of_field = |key: (u64, u32)| {
         let (cell, field) = key;
         mutant!("reference: nodes of the first field hold all bodies": field = 0);
-        let is_new = |index| {
-            let beside = |cell: [u32; D]| occupied.contains(&(grid.id(cell), field));
-            nodes.number(grid.id_in(field, index)).is_none() || !cells_around(index).any(beside)
-        };
+        let is_new = |index, one| nodes.number(grid.id_in(field, index)).is_none() || !held.contains(&(field, one));
         (key, of_cell(grid.index(cell), &is_new))
     };
     let new = cells(present.iter().enumerate().map(|(p, x)| (x, field(p))), grid).into_iter();
@@ -50,7 +49,7 @@ pub(crate) fn reached_conditions<const D: usize>(
     for (p, (x, before)) in present.iter().zip(at_reset).enumerate() {
         let met = grid.cell(x).and_then(|cell| new.get(&(grid.id(cell), field(p)))).filter(|met| !met.is_empty());
         let Some(met) = met else { continue };
-        let were_there = grid.cell(before).map_or_else(BTreeSet::new, |cell| of_cell(cell, &|_| true));
+        let were_there = grid.cell(before).map_or_else(BTreeSet::new, |cell| of_cell(cell, &|_, _| true));
         reached.extend(met.difference(&were_there));
     }
     reached
@@ -137,12 +136,6 @@ fn cells<'a, const D: usize, T: Ord>(
     cells.sort_unstable();
     cells.dedup();
     cells
-}
-
-/// The cells around a node.
-fn cells_around<const D: usize>(node: [u32; D]) -> impl Iterator<Item = [u32; D]> {
-    let fits = move |by: &[u64; D]| (0..D).all(|k| u64::from(node[k]) >= by[k]);
-    indices([2; D]).filter(fits).map(move |by| std::array::from_fn(|k| node[k] - by[k] as u32))
 }
 
 /// The nodes of a cell.
