@@ -333,6 +333,27 @@ fn every_body_meets_held_nodes_and_walls_whatever_its_place_in_the_list() -> Res
     Ok(())
 }
 
+/// On a grid that is kept, one body stands at a wall, and another one comes to the same nodes of the wall.
+#[test]
+fn a_wall_that_holds_one_body_stops_another_one() -> Result<(), Failure> {
+    let block = |name: &str, min: [f64; 2], max: [f64; 2], speed: f64| {
+        merged(solid(name, 1000, json!({ "box": { "min": min, "max": max } })), json!({ "velocity": [speed, 0] }))
+    };
+    let (stands, comes) = (block("stands", [2.5, 1.05], [3.0, 1.3], 0.0), block("comes", [2.0, 1.4], [2.4, 1.5], 2.0));
+    for (bodies, number) in [([&stands, &comes], 1), ([&comes, &stands], 0)] {
+        let mut simulation: Simulation<2> = built(&json!({
+            "grid": { "size": [3, 2], "spacing": 0.125, "reset": { "strain": 0.3 } },
+            "time": { "step": 0.005, "end": 1 },
+            "bodies": bodies,
+            "boundary": { "right": "sliding" },
+            "contact": {}
+        }))?;
+        run_to(&mut simulation, 0.4)?;
+        assert!(momentum(&simulation, number)[0] < 0.0, "it bounces off");
+    }
+    Ok(())
+}
+
 #[test]
 fn a_joint_of_a_group_is_no_surface() -> Result<(), Failure> {
     let block = |name, min: f64, max: f64| solid(name, 1000, json!({ "box": { "min": [min, 0], "max": [max, 1] } }));
