@@ -71,7 +71,7 @@ const PROGRAM: &str = concat!("bfree ", env!("CARGO_PKG_VERSION"));
 pub struct Identity {
     /// The scene with all defaults.
     scene: Value,
-    /// Checksums of the particles at the start.
+    /// Checksums of the particles at the start, and of the files of curves.
     start: Vec<(String, u32)>,
 }
 
@@ -79,6 +79,12 @@ impl Identity {
     /// Identity of the run of `scene` that starts with `particles`.
     pub fn new<const D: usize>(scene: Value, particles: &Particles<D>) -> Self {
         Self { scene, start: state::fingerprint(particles) }
+    }
+
+    /// Adds the checksums of other files that the scene names, by key.
+    pub fn with_files(mut self, files: impl IntoIterator<Item = (String, u32)>) -> Self {
+        self.start.extend(files);
+        self
     }
 
     /// Checks that a checkpoint with the identity `then` belongs to this run.
@@ -89,7 +95,7 @@ impl Identity {
             return Err(CheckpointError::OtherScene { path, key, then: shown(then), now: shown(now) });
         }
         match self.start.iter().find(|array| !then.start.contains(array)) {
-            Some((array, _)) => Err(CheckpointError::OtherParticles { path, array: array.clone() }),
+            Some((array, _)) => Err(CheckpointError::OtherStart { path, array: array.clone() }),
             None => Ok(()),
         }
     }
@@ -172,12 +178,12 @@ pub enum CheckpointError {
     },
     /// The particles at the start have changed.
     #[error(
-        "{} is of a run that started with other particles: {array} differs; has a file of particles, triangles or pixels changed?", path.display()
+        "{} is of a run that started otherwise: {array} differs; has a file of particles, triangles, pixels or a curve changed?", path.display()
     )]
-    OtherParticles {
+    OtherStart {
         /// The checkpoint.
         path: PathBuf,
-        /// The quantity that differs.
+        /// The quantity of the particles, or the key of the curve, that differs.
         array: String,
     },
 }

@@ -39,8 +39,8 @@ mod reference;
 pub mod report;
 pub(crate) mod snapshots;
 mod summary;
+mod surfaces;
 pub mod touched;
-mod touching;
 pub mod vtu;
 pub mod warnings;
 

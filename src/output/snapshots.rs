@@ -5,7 +5,7 @@ use super::fields::padded;
 use super::outlines::Outlines;
 use super::pvd::{self, CONTACTS, OBSTACLES, SERIES};
 use super::vtu::{Array, Background, Snapshot};
-use super::{OutputError, Reference, touching};
+use super::{OutputError, Reference, surfaces};
 use crate::clock::Clock;
 use crate::field::{Field, Kind};
 use crate::material::Law;
@@ -132,7 +132,7 @@ impl<const D: usize> Snapshots<D> {
             self.add(1, OBSTACLES, &outlines, &of_obstacles)?;
         }
         if self.touches {
-            self.add(2, CONTACTS, &touching::snapshot(simulation, &particles), &of_surfaces)?;
+            self.add(2, CONTACTS, &surfaces::snapshot(simulation, &particles), &of_surfaces)?;
         }
         self.add(0, SERIES, &particles, &file)?;
         self.mark.written += 1;

@@ -118,7 +118,7 @@ impl Run {
         let probes = bound_probes(scene, &simulation);
         let (inputs, warnings) = self.inputs(scene, &simulation, &probes, &directory)?;
         let settings = serde_json::to_value(scene).map_err(Failure::run)?;
-        let identity = Identity::new(settings, &simulation.particles);
+        let identity = Identity::new(settings, &simulation.particles).with_files(scene.curve_files());
         let schedule = Schedule::new(&simulation.clock, scene.time.end, self.steps);
         let output = OutputSettings {
             directory: directory.clone(),

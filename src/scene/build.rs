@@ -119,6 +119,11 @@ impl Scene {
         bodies.chain(prescribed).chain(loads).chain(obstacles).chain(initial).collect()
     }
 
+    /// The checksums of the files of curves that [`Self::build`] has read, by key.
+    pub fn curve_files(&self) -> impl Iterator<Item = (String, u32)> {
+        self.curves().into_iter().filter_map(|(path, curve)| Some((format!("{path}.file"), curve.checksum()?)))
+    }
+
     /// All curves, with their paths.
     fn curves(&self) -> Vec<(String, &Curve)> {
         let gravity = self.gravity.iter().flat_map(|gravity| {

@@ -3,6 +3,7 @@
 use super::file::{FileError, open};
 use crate::mechanics::loads::{self, CurveError};
 use crate::problems::{Number, Problems};
+use crc32fast::hash;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::io::Read;
@@ -144,6 +145,14 @@ impl Curve {
         match self {
             Self::Of(OtherCurve::File(file)) => file.read(folder),
             _ => Ok(()),
+        }
+    }
+
+    /// The checksum of a file that has been read.
+    pub(super) fn checksum(&self) -> Option<u32> {
+        match self {
+            Self::Of(OtherCurve::File(file)) => Some(hash(bytemuck::cast_slice(file.rows.get()?))),
+            _ => None,
         }
     }
 

@@ -16,9 +16,10 @@
 //! # A kink between the perturbations
 //!
 //! A yield surface at the distance d divides the ladder: steps above d cross it. If both sides cross it, in a direction almost tangential to
-//! the surface, all three estimates may agree on a wrong derivative. So there is a last look near √ε, at the central difference, or at a kink at
-//! both sides. A side that it contradicts is dropped, if the other one is sharp. If it contradicts the central difference or both sides, or if no side of a kink is sharp,
-//! the ladder starts anew at smaller steps. Estimates from above the kink are never averaged with those from below.
+//! the surface, all three estimates may agree on a wrong derivative. So there is a last look near √ε: at the central difference, or at a kink
+//! at both sides. A side that the look contradicts is dropped, if the other one is sharp. If the look contradicts the central difference or
+//! both sides, or if no side of a kink is sharp, the ladder starts anew at smaller steps. Estimates from above the kink are never averaged
+//! with those from below.
 //!
 //! # Measured
 //!

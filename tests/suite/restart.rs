@@ -297,8 +297,30 @@ fn a_changed_particle_file_is_noticed() -> Result<(), Failure> {
     };
     assert_eq!(run(0.1, &["--steps", "3"])?.0, Some(0));
     let (_, text) = run(0.2, &["--restart"])?;
-    assert!(text.contains("other particles: volume differs"), "{text}");
+    assert!(text.contains("started otherwise: volume differs"), "{text}");
     let (code, text) = run(0.1, &["--restart"])?;
+    assert_eq!(code, Some(0), "{text}");
+    Ok(())
+}
+
+#[test]
+fn a_changed_curve_file_is_noticed() -> Result<(), Failure> {
+    let folder = tempfile::tempdir()?;
+    let (scene, out) = (folder.path().join("scene.json"), folder.path().join("out"));
+    let text = r#"{"grid": {"size": [2, 2], "spacing": 0.5}, "time": {"step": 0.1, "end": 1}, "output": {"checkpoint": 0.2},
+        "bodies": [{"name": "a", "shape": {"box": {"min": [0, 0], "max": [2, 1]}}, "density": 1, "material": {"neo_hookean": {"bulk": 1, "shear": 1}}}],
+        "boundary": {"bottom": {"velocity": {"direction": [0.01, 0], "curve": {"file": "ground.csv"}}}}}"#;
+    std::fs::write(&scene, text)?;
+    let run = |end: f64, arguments: &[&str]| -> Result<(Option<i32>, String), Failure> {
+        std::fs::write(folder.path().join("ground.csv"), format!("0 0\n1 {end}\n"))?;
+        let mut program = Command::new(env!("CARGO_BIN_EXE_bfree"));
+        let (code, _, text) = said(program.arg("run").arg(&scene).arg("--out").arg(&out).args(arguments))?;
+        Ok((code, text))
+    };
+    assert_eq!(run(1.0, &["--steps", "3"])?.0, Some(0));
+    let (_, text) = run(2.0, &["--restart"])?;
+    assert!(text.contains("started otherwise: boundary.bottom.velocity.curve.file differs"), "{text}");
+    let (code, text) = run(1.0, &["--restart"])?;
     assert_eq!(code, Some(0), "{text}");
     Ok(())
 }

@@ -11,9 +11,9 @@ use std::collections::{BTreeSet, HashMap, HashSet};
 /// A node belongs to one body if the variance of the body index at that node, relative to its mean square, is below this tolerance.
 const ALONE: f64 = 1e-9;
 
-/// The prescribed conditions that a particle has reached. Its cell has a node of the condition that is not active yet, or of a condition
-/// that had no node in any cell of the same nodal field at the last grid reset. (Wide functions make such nodes active, and they hold
-/// nearly nothing of the body.) The cell of the particle had no node of the condition then.
+/// The prescribed conditions that a particle has reached since the last grid reset. A condition is reached if the particle's cell has a node
+/// of it now, and had none at the reset. The node must not be active yet, or at the reset no cell of the particle's nodal field had a node
+/// of the condition: wide functions make nodes active from afar, and such nodes hold nearly nothing of the body.
 pub(crate) fn reached_conditions<const D: usize>(
     particles: &Particles<D>,
     prescribed: &[Prescribed<D>],

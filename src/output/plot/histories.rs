@@ -25,8 +25,8 @@ pub(super) fn on_one_scale(panels: &mut [Panel], quantity: impl Fn(&str) -> Stri
     }
 }
 
-/// One panel for each name in the columns of `table` that is `shown`, in order, at most [`MOST`]. Returns the panels, and a text with the number of panels
-/// before this limit and the names of panels left out.
+/// One panel for each name in the columns of `table` that is `shown`, in order, at most [`MOST`]. Returns the panels, and a text with the
+/// number of panels before this limit and the names of panels left out.
 ///
 /// A panel is left out if everything in it is 0, up to the round-off of the largest panel of the same `quantity`.
 pub(super) fn panels(

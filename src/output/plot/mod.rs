@@ -1,6 +1,6 @@
-//! Pictures of a finished (or killed) run: energies, momentum, probes, reactions, forces of contact, iterations, Newton's convergence, and the particles of
-//! the last snapshot. The page `report.html` shows the charts, the numbers of the run and a player of its snapshots. The page needs no
-//! other file.
+//! Pictures of a finished (or killed) run: energies, momentum, probes, reactions, forces of contact, iterations, Newton's convergence, and
+//! the particles of the last snapshot. The page `report.html` shows the charts, the numbers of the run and a player of its snapshots. The
+//! page needs no other file.
 //!
 //! Pictures are drawn as SVG, with axes and names measured in the font DejaVu Sans. PNG files are rendered from the SVG. The program
 //! contains the font, so no fonts need to be installed.
@@ -95,8 +95,8 @@ pub(crate) fn is_picture(file: &str) -> bool {
 /// Draws the results in the directory of a run, as `.svg` and `.png` in the same directory. Returns the files written.
 ///
 /// The pictures are `energies`, `momentum` and `iterations`, and `convergence` once there are steps. A run that has probes, reactions,
-/// obstacles, pairs of bodies that touched, or snapshots also gets `probes`, `reactions`, `obstacles`, `contacts` or `particles`. A picture in which all values are round-off is left out. The page
-/// `report.html` holds the charts and a player of the snapshots.
+/// obstacles, pairs of bodies that touched, or snapshots also gets `probes`, `reactions`, `obstacles`, `contacts` or `particles`. A picture
+/// in which all values are round-off is left out. The page `report.html` holds the charts and a player of the snapshots.
 ///
 /// ```
 /// use bfree::output::{Audience, Outcome, OutputSettings, Recorder, Reference, plot::{Look, plot_run}};
