@@ -17,6 +17,7 @@
 
 mod cause;
 mod check;
+mod observations;
 mod ranges;
 
 pub use check::{CheckColumns, Perturbation, check_law, check_law_by};

@@ -1,16 +1,17 @@
 //! The check of a law along paths.
 
 use super::cause::Causes;
+use super::observations::{SIDES, observations};
 use super::ranges;
-use super::{History, Input, Perturbed, Road, Visit, inputs_read, probe, roads};
-use crate::convention::{Configuration, Convention, Measure, cauchy_stress};
-use crate::diagnosis::{Elsewhere, Measured, Observation, diagnose, invisible, nearest};
+use super::{History, Input, Perturbed, Road, Visit, inputs_read, roads};
+use crate::convention::{Convention, Measure, cauchy_stress};
+use crate::diagnosis::{diagnose, invisible, nearest};
 use crate::finding::{Finding, Reason, Report, Verdict};
 use crate::judge::{Loading, check_along};
-use crate::law::{CallFailed, Law, Response, Step};
+use crate::law::{CallFailed, Law, Response};
 use crate::matrix::Matrix;
 use crate::states::Path;
-use crate::tensor::{exponential, norm, product, product3, rotation_about, scaled, sum, transposed};
+use crate::tensor::{norm, product, product3, rotation_about, sum, transposed};
 use std::cell::RefCell;
 
 /// The response with column k perturbed by h.
@@ -19,13 +20,8 @@ pub type Perturbation<'a> = dyn FnMut(usize, f64) -> Result<Vec<f64>, CallFailed
 /// A check of a claimed tangent at a response: `judge::check_columns`, or another of the same signature.
 pub type CheckColumns<'a> = dyn FnMut(&str, &Matrix, &[f64], &mut Perturbation) -> Finding + 'a;
 
-/// In so many wrong states the tangents elsewhere are measured for the diagnosis.
-const DIAGNOSED: usize = 10;
 /// From so many steps it is taken which inputs the law reads.
 const PROBED: usize = 6;
-/// Derivatives to both sides that differ by more than this, relative to the greatest entry, are a kink.
-const SIDES: f64 = 1e-6;
-
 /// A stress that errs by more than this of its size after a rotation does not turn with the body.
 const OBJECTIVE: f64 = 1e-6;
 
@@ -289,7 +285,7 @@ fn travel(law: &mut dyn Law, road: Road, visits: &[Visit], check: &mut Check) ->
 /// Adds what explains wrong tangents, and the mistakes that the states cannot show.
 fn diagnose_into(law: &mut dyn Law, visits: &[Visit], travelled: &Travelled, report: &mut Report) {
     let convention = law.convention();
-    let observations = observations(law, visits, travelled);
+    let observations = observations(law, visits, travelled.road, &travelled.findings);
     let hidden = invisible(&convention, &observations);
     if !hidden.is_empty() {
         report.notes.push(format!("Mistakes that this check cannot show: {}.", hidden.join("; ")));
@@ -306,161 +302,4 @@ fn diagnose_into(law: &mut dyn Law, visits: &[Visit], travelled: &Travelled, rep
             report.notes.push(format!("No frequent mistake explains the wrong tangent.{near}"));
         }
     }
-}
-
-/// The measured states; for some wrong ones also the tangents elsewhere.
-fn observations(law: &mut dyn Law, visits: &[Visit], travelled: &Travelled) -> Vec<Observation> {
-    let convention = law.convention();
-    let measured = |finding: &Finding| Measured { tangent: finding.measured.clone(), errors: finding.errors.clone() };
-    let wrong: Vec<usize> =
-        (0..visits.len()).filter(|index| travelled.findings[*index].verdict == Verdict::Wrong).collect();
-    let chosen: Vec<usize> = wrong.iter().step_by(wrong.len().div_ceil(DIAGNOSED).max(1)).copied().collect();
-    let flowing = if chosen.is_empty() { Vec::new() } else { flow_variables(law) };
-    let rest = if chosen.is_empty() { None } else { at_rest(law, travelled.road, &flowing) };
-    let mut observations = Vec::new();
-    for (index, (visit, finding)) in visits.iter().zip(&travelled.findings).enumerate() {
-        let judged = matches!(finding.verdict, Verdict::Wrong | Verdict::Consistent | Verdict::Inexact)
-            && (wrong.is_empty() || smooth(law, &visit.step, travelled.road, finding));
-        let Some(stress) =
-            cauchy_stress(&convention, &visit.response.stress, &visit.step.gradient).ok().filter(|_| judged)
-        else {
-            continue;
-        };
-        let [gradient_before, gradient] = [visit.step.gradient_before, visit.step.gradient];
-        let mut elsewhere = Vec::new();
-        if let Some(before) = visit.before {
-            elsewhere.push((Elsewhere::StepBefore, measured(&travelled.findings[before])));
-        }
-        elsewhere.extend(rest.clone().map(|rest| (Elsewhere::AtRest, rest)));
-        if chosen.contains(&index) {
-            let history = History::after(&visit.step, &visit.response);
-            let start = History::before(&visit.step);
-            let sides = both_sides(law, &start, visit.step.length, travelled.road, &flowing);
-            elsewhere.extend(sides.map(|[elastic, _]| (Elsewhere::StartOfStep, elastic)));
-            if let Some([elastic, continuum]) = both_sides(law, &history, visit.step.length, travelled.road, &flowing) {
-                elsewhere.extend([(Elsewhere::Elastic, elastic), (Elsewhere::Continuum, continuum)]);
-            }
-        }
-        let at = Configuration { gradient_before, gradient, stress };
-        let claimed = finding.claimed.clone();
-        observations.push(Observation {
-            name: visit.name.clone(),
-            at,
-            claimed,
-            measured: measured(finding),
-            elsewhere,
-        });
-    }
-    observations
-}
-
-/// Whether the derivatives to both sides are the measured one. At a kink the law may rightly claim either of them, so that the state
-/// tells nothing about a mistake.
-fn smooth(law: &mut dyn Law, step: &Step, road: Road, finding: &Finding) -> bool {
-    let (measured, errors) = (&finding.measured, &finding.errors);
-    let mut perturbed = Perturbed::new(law, step, road);
-    (0..measured.columns).all(|column| {
-        [1.0, -1.0].into_iter().all(|sign| {
-            let side = one_sided(measured.rows, sign, &mut |h| perturbed.value(column, h).ok());
-            side.is_some_and(|(derivative, error)| {
-                (0..measured.rows).all(|row| {
-                    let tolerance = SIDES * measured.greatest() + 10.0 * (errors[(row, column)] + error[row]);
-                    (derivative[row] - measured[(row, column)]).abs() <= tolerance
-                })
-            })
-        })
-    })
-}
-
-/// The tangent at rest.
-fn at_rest(law: &mut dyn Law, road: Road, flowing: &[usize]) -> Option<Measured> {
-    let history = History::at_rest(law);
-    both_sides(law, &history, 1.0, road, flowing).map(|[elastic, _]| elastic)
-}
-
-/// The internal variables that change by flow alone: a small general strain from rest leaves them as they are.
-fn flow_variables(law: &mut dyn Law) -> Vec<usize> {
-    let history = History::at_rest(law);
-    let strain = probe(law.convention().plane());
-    let step = history.step_to(&exponential(&scaled(1e-3, &strain)), 1e-10);
-    let state = step.and_then(|step| law.respond(&step).ok()).map(|response| response.state).unwrap_or_default();
-    (0..state.len().min(history.state.len())).filter(|k| state[*k] == history.state[*k]).collect()
-}
-
-/// The one-sided derivatives of a step of no deformation and nearly no time: on the side without flow (elastic), and on the other
-/// (continuum). A column in which both sides flow, as at an apex, has no elastic side: its errors are infinite. `None` if a call fails.
-fn both_sides(
-    law: &mut dyn Law,
-    history: &History,
-    length: f64,
-    road: Road,
-    flowing: &[usize],
-) -> Option<[Measured; 2]> {
-    let step = history.step_to(&history.gradient, 1e-10 * length)?;
-    let convention = law.convention();
-    let [rows, columns] = [convention.stress.count(), convention.strain.count()];
-    let zeros = Measured { tangent: Matrix::zeros(rows, columns), errors: Matrix::zeros(rows, columns) };
-    let mut sides = [zeros.clone(), zeros];
-    for column in 0..columns {
-        let forward = changes(law, &step, road, (column, GREATEST))?;
-        let backward = changes(law, &step, road, (column, -GREATEST))?;
-        // Damage grows from the first strain on, but rests while the body is unloaded.
-        let by_flow = |k: &usize| flowing.contains(k) || forward[*k] != backward[*k];
-        let by_flow: Vec<usize> = (0..forward.len()).filter(by_flow).collect();
-        let [forward, backward] = [forward, backward].map(|changes| by_flow.iter().any(|k| changes[*k]));
-        let elastic = if forward { -1.0 } else { 1.0 };
-        for (side, sign) in sides.iter_mut().zip([elastic, -elastic]) {
-            let mut perturbed = Perturbed::new(law, &step, road);
-            let (derivative, errors) = one_sided(rows, sign, &mut |h| perturbed.value(column, h).ok())?;
-            let unknown = forward && backward && sign == elastic;
-            for row in 0..rows {
-                side.tangent[(row, column)] = derivative[row];
-                side.errors[(row, column)] = if unknown { f64::INFINITY } else { errors[row] };
-            }
-        }
-    }
-    Some(sides)
-}
-
-/// Whether a perturbation of a column by h changes each internal variable. `None` if a call fails or loses variables.
-fn changes(law: &mut dyn Law, step: &Step, road: Road, (column, h): (usize, f64)) -> Option<Vec<bool>> {
-    let perturbed = Perturbed::new(law, step, road).step(column, h).ok()?;
-    let state = law.respond(&perturbed).ok()?.state;
-    (state.len() == step.state.len()).then(|| state.iter().zip(&step.state).map(|(new, old)| new != old).collect())
-}
-
-/// The greatest perturbation of the one-sided derivatives.
-const GREATEST: f64 = 1e-4;
-
-/// The one-sided derivative of a vector function at 0, by Richardson's extrapolation of (f(h) − f(0))/h with h halved
-/// (Ridders, 1982), and the error of each component.
-fn one_sided(rows: usize, sign: f64, f: &mut dyn FnMut(f64) -> Option<Vec<f64>>) -> Option<(Vec<f64>, Vec<f64>)> {
-    const LEVELS: usize = 7;
-    const ORDERS: usize = 6;
-    let origin = f(0.0)?;
-    let mut best = (vec![f64::NAN; rows], vec![f64::INFINITY; rows]);
-    let mut above: Vec<Vec<f64>> = Vec::new();
-    for level in 0..LEVELS {
-        let h = sign * GREATEST * 0.5_f64.powi(level as i32);
-        let value = f(h)?;
-        let mut line = vec![(0..rows).map(|row| (value[row] - origin[row]) / h).collect::<Vec<f64>>()];
-        // Rounding of F moves the stress by ε times the tangent.
-        let size = origin.iter().chain(&line[0]).fold(0.0_f64, |size, entry| size.max(entry.abs()));
-        for order in 1..=level.min(ORDERS) {
-            let factor = 2.0_f64.powi(order as i32);
-            let extrapolated = |row: usize| (factor * line[order - 1][row] - above[order - 1][row]) / (factor - 1.0);
-            let next: Vec<f64> = (0..rows).map(extrapolated).collect();
-            for row in 0..rows {
-                let change = (next[row] - line[order - 1][row]).abs().max((next[row] - above[order - 1][row]).abs());
-                let noise = 4.0 * f64::EPSILON * size / h.abs();
-                if change.max(noise) < best.1[row] {
-                    best.0[row] = next[row];
-                    best.1[row] = change.max(noise);
-                }
-            }
-            line.push(next);
-        }
-        above = line;
-    }
-    Some(best)
 }
