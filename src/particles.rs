@@ -103,6 +103,17 @@ pub struct Particles<const D: usize> {
     pub dilatation: Vec<f64>,
     /// The configuration of the last grid reset; `None` if the coming step resets the grid.
     pub(crate) reference: Option<Configuration<D>>,
+    /// The outlines of the undeformed bodies in the plane, for pictures. Empty if a body has no outline.
+    pub(crate) outlines: Vec<Outline<D>>,
+}
+
+/// A closed line around an undeformed body of the plane, or around a hole in it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Outline<const D: usize> {
+    /// Index of the body in the simulation's list.
+    pub body: u32,
+    /// The corners. The body lies at the left of the line.
+    pub corners: Vec<Vector<f64, D>>,
 }
 
 /// Positions and deformations of all particles in one configuration.

@@ -51,6 +51,7 @@ pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) 
         remembered: _,
         dilatation,
         reference,
+        outlines: _,
     } = particles;
     let mut arrays = of_history(history, loads.prescribed.len());
     arrays.extend([

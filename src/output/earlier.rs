@@ -4,7 +4,7 @@ use super::OutputError;
 use super::files::TEMPORARY;
 use super::mark::Mark;
 use super::plot::is_picture;
-use super::pvd::{CONTACTS, OBSTACLES, SERIES};
+use super::pvd::{BODIES, CONTACTS, OBSTACLES, SERIES};
 use super::snapshots::SnapshotMark;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ const HISTORY: &str = "history.csv";
 const START: &[u8] = b"step,time,";
 
 /// The files of a run, beside its snapshots and its pictures.
-const FILES: [&str; 10] = [
+const FILES: [&str; 11] = [
     HISTORY,
     "reactions.csv",
     "obstacles.csv",
@@ -27,6 +27,7 @@ const FILES: [&str; 10] = [
     SERIES,
     OBSTACLES,
     CONTACTS,
+    BODIES,
 ];
 
 /// Whether a run may write a file of this name.
@@ -115,7 +116,7 @@ fn last_row(history: &Path) -> Option<(u64, f64)> {
 pub(super) fn remove_later_files(directory: &Path, mark: Option<&Mark>) -> Result<(), OutputError> {
     let snapshots = mark.and_then(|mark| mark.snapshots).unwrap_or_default();
     let continued = |name: &str| {
-        mark.is_some_and(|mark| [SERIES, OBSTACLES, CONTACTS].contains(&name) || mark.files.contains_key(name))
+        mark.is_some_and(|mark| [SERIES, OBSTACLES, CONTACTS, BODIES].contains(&name) || mark.files.contains_key(name))
     };
     let entries = std::fs::read_dir(directory).map_err(OutputError::io("read", directory))?;
     for entry in entries {

@@ -11,6 +11,7 @@
 //! | `probes.csv` | fields at chosen particles or points, if any are asked for |
 //! | `particles.pvd`, `particles_*.vtu` | snapshots of the particles for ParaView |
 //! | `obstacles.pvd`, `obstacles_*.vtu` | the surfaces of the obstacles at the same times, if there are any |
+//! | `bodies.pvd`, `bodies_*.vtu` | the outlines of the bodies at the same times, in 2D, if all bodies are shapes that cut their cells |
 //! | `contacts.pvd`, `contacts_*.vtu` | pressure, traction and gap of every surface point at the same times, if bodies may touch anything |
 //! | `newton.jsonl` | Newton's method, one line per step; moved into `report.json` at the end, but also kept if there are checkpoints |
 //! | `report.json` | settings, outcome, counts, seconds by phase, Newton and Krylov iterations and residuals of every step, warnings |
@@ -28,6 +29,7 @@ pub(crate) mod files;
 pub mod history;
 mod losses;
 mod mark;
+mod moved_outlines;
 mod outlines;
 pub(crate) mod path;
 pub mod plot;

@@ -2,16 +2,12 @@
 
 use super::fields::padded;
 use super::vtu::{Array, Snapshot};
-use crate::grid::{Grid, indices};
+use crate::grid::Grid;
 use crate::mechanics::loads::{Contacts, Obstacle};
-use crate::shape::GridBox;
 use crate::tensor::Vector;
 
 /// The largest number of cells along the longest edge of an obstacle, in 1D, 2D and 3D. No cell is smaller than a cell of the grid.
 const CELLS: [f64; 3] = [64.0, 64.0, 24.0];
-
-/// The largest distance between a surface and its simplices, relative to a cell, in 1D, 2D and 3D.
-const FLAT: [f64; 3] = [1e-3, 1e-3, 1e-2];
 
 /// The surfaces of all obstacles, in their frames: the corners of simplices, D for each.
 #[derive(Debug)]
@@ -38,23 +34,9 @@ impl<const D: usize> Outlines<D> {
 
 /// The corners of the simplices on the surface of an obstacle.
 fn outline<const D: usize>(obstacle: &Obstacle<D>, grid: &Grid<D>) -> Vec<Vector<f64, D>> {
-    let (h, end) = (grid.spacing, grid.position(grid.cells));
-    let (min, max) = obstacle.shape.bounding_box();
-    let finite = |x: f64, other: f64| if x.is_finite() { x } else { other };
-    let min = Vector::<f64, D>::from_fn(|k, _| finite(min[k], grid.origin[k].min(max[k]) - h));
-    let max = Vector::<f64, D>::from_fn(|k, _| finite(max[k], end[k].max(min[k]) + h));
-    let edge = h.max((max - min).max() / CELLS[D.clamp(1, 3) - 1]);
-    let count: [u64; D] = std::array::from_fn(|k| ((max[k] - min[k]) / edge).ceil().max(0.0) as u64 + 2);
-    let mut corners = Vec::new();
-    for cell in indices(count) {
-        // The cells begin off the faces of the shape: a face between two cells would be drawn twice, or not at all.
-        let lower = Vector::<f64, D>::from_fn(|k, _| min[k] + edge * (cell[k] as f64 - 0.9));
-        let of = GridBox { lower, edges: Vector::repeat(edge), spacing: edge };
-        if obstacle.shape.signed_distance(&lower.add_scalar(0.5 * edge)).abs() <= edge * (D as f64).sqrt() {
-            obstacle.shape.add_surface(&of, FLAT[D.clamp(1, 3) - 1], &mut corners);
-        }
-    }
-    corners
+    let (min, max) = obstacle.shape.bounds_near(grid);
+    let edge = grid.spacing.max((max - min).max() / CELLS[D.clamp(1, 3) - 1]);
+    obstacle.shape.surface_simplices(grid, edge)
 }
 
 #[cfg(test)]

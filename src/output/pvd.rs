@@ -11,6 +11,9 @@ pub(crate) const SERIES: &str = "particles.pvd";
 /// The series of the obstacles.
 pub(crate) const OBSTACLES: &str = "obstacles.pvd";
 
+/// The series of the outlines of bodies.
+pub(crate) const BODIES: &str = "bodies.pvd";
+
 /// The series of the surfaces that may touch.
 pub(crate) const CONTACTS: &str = "contacts.pvd";
 

@@ -6,6 +6,7 @@ use super::files::Stream;
 use super::history::{self, Cost, Energies};
 use super::losses::Cause;
 use super::mark::Mark;
+use super::moved_outlines::MovedOutlines;
 use super::outlines::Outlines;
 use super::path::Point;
 use super::probes::{self, Probe};
@@ -151,7 +152,8 @@ impl<const D: usize> Recorder<D> {
             .map(|every| {
                 let outlines =
                     (!loads.contacts.obstacles.is_empty()).then(|| Outlines::of(&loads.contacts, &simulation.grid));
-                Snapshots::new(directory.clone(), &fields, outlines, loads.contacts.exist(), every, written)
+                let bodies = MovedOutlines::of(&simulation.particles, &reference, simulation.grid.spacing);
+                Snapshots::new(directory.clone(), &fields, outlines, loads.contacts.exist(), bodies, every, written)
             })
             .transpose()?;
         Ok(Self {

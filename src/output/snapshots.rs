@@ -1,9 +1,10 @@
-//! Snapshots of the particles, of the obstacles and of surfaces that may touch: `particles_*.vtu`, `obstacles_*.vtu`, `contacts_*.vtu`, and
-//! their series, such as `particles.pvd`.
+//! Snapshots of the particles, of the obstacles, of surfaces that may touch and of the outlines of bodies: `particles_*.vtu`,
+//! `obstacles_*.vtu`, `contacts_*.vtu`, `bodies_*.vtu`, and their series, such as `particles.pvd`.
 
 use super::fields::padded;
+use super::moved_outlines::MovedOutlines;
 use super::outlines::Outlines;
-use super::pvd::{self, CONTACTS, OBSTACLES, SERIES};
+use super::pvd::{self, BODIES, CONTACTS, OBSTACLES, SERIES};
 use super::vtu::{Array, Background, Snapshot};
 use super::{OutputError, Reference, surfaces};
 use crate::clock::Clock;
@@ -22,8 +23,10 @@ pub(crate) struct Snapshots<const D: usize> {
     outlines: Option<Outlines<D>>,
     /// Whether surfaces may touch.
     touches: bool,
-    /// The entries of the series of particles, obstacles and surfaces.
-    entries: [String; 3],
+    /// The outlines of the bodies, if pictures need them.
+    bodies: Option<MovedOutlines<D>>,
+    /// The entries of the series of particles, obstacles, surfaces and outlines of bodies.
+    entries: [String; 4],
     /// Time between snapshots.
     every: f64,
     pub(crate) mark: SnapshotMark,
@@ -40,18 +43,27 @@ pub(crate) struct SnapshotMark {
     passed: Option<f64>,
 }
 
-/// File names of a snapshot of particles begin with this, and of one of obstacles and of surfaces.
-const STEMS: [&str; 3] = ["particles_", "obstacles_", "contacts_"];
+/// File names of a snapshot of particles begin with this, and of one of obstacles, of surfaces and of outlines of bodies.
+const STEMS: [&str; 4] = ["particles_", "obstacles_", "contacts_", "bodies_"];
 
-/// File names of a snapshot of particles, of obstacles and of surfaces.
-fn names(number: usize) -> [String; 3] {
+/// File names of a snapshot of particles, of obstacles, of surfaces and of outlines of bodies.
+fn names(number: usize) -> [String; 4] {
     STEMS.map(|stem| format!("{stem}{number:06}.vtu"))
 }
 
 /// The file of the obstacles beside a file of particles.
 pub(crate) fn obstacles_beside(particles: &Path) -> Option<PathBuf> {
+    beside(particles, STEMS[1])
+}
+
+/// The file of the outlines of bodies beside a file of particles.
+pub(crate) fn bodies_beside(particles: &Path) -> Option<PathBuf> {
+    beside(particles, STEMS[3])
+}
+
+fn beside(particles: &Path, stem: &str) -> Option<PathBuf> {
     let name = particles.file_name()?.to_str()?.strip_prefix(STEMS[0])?;
-    Some(particles.with_file_name(format!("{}{name}", STEMS[1]))).filter(|path| path.is_file())
+    Some(particles.with_file_name(format!("{stem}{name}"))).filter(|path| path.is_file())
 }
 
 impl SnapshotMark {
@@ -86,6 +98,7 @@ impl<const D: usize> Snapshots<D> {
         fields: &[Field],
         outlines: Option<Outlines<D>>,
         touches: bool,
+        bodies: Option<MovedOutlines<D>>,
         every: f64,
         mark: SnapshotMark,
     ) -> Result<Self, OutputError> {
@@ -93,8 +106,9 @@ impl<const D: usize> Snapshots<D> {
             return Err(OutputError::SnapshotEvery(every));
         }
         let unique = fields.iter().enumerate().filter(|&(k, field)| !fields[..k].contains(field));
-        let mut entries = [const { String::new() }; 3];
-        let series = [Some(SERIES), outlines.as_ref().map(|_| OBSTACLES), touches.then_some(CONTACTS)];
+        let mut entries = [const { String::new() }; 4];
+        let (of_obstacles, of_bodies) = (outlines.as_ref().map(|_| OBSTACLES), bodies.as_ref().map(|_| BODIES));
+        let series = [Some(SERIES), of_obstacles, touches.then_some(CONTACTS), of_bodies];
         for (entries, series) in entries.iter_mut().zip(series).filter(|_| mark.written > 0) {
             let Some(series) = series else { continue };
             let path = directory.join(series);
@@ -102,7 +116,7 @@ impl<const D: usize> Snapshots<D> {
             pvd::write(&path, entries)?;
         }
         let fields = unique.map(|(_, field)| field.clone()).collect();
-        Ok(Self { fields, directory, outlines, touches, entries, every, mark })
+        Ok(Self { fields, directory, outlines, touches, bodies, entries, every, mark })
     }
 
     /// Whether the time has reached a multiple of `every` since the last call that was due, or there was no such call.
@@ -125,7 +139,7 @@ impl<const D: usize> Snapshots<D> {
         if self.mark.last == Some(step) {
             return Ok(());
         }
-        let [file, of_obstacles, of_surfaces] = names(self.mark.written);
+        let [file, of_obstacles, of_surfaces, of_bodies] = names(self.mark.written);
         let particles = snapshot(simulation, reference, &self.fields)?;
         if let Some(outlines) = &self.outlines {
             let outlines = outlines.at(&simulation.loads.contacts, simulation.clock.time(), &particles);
@@ -133,6 +147,9 @@ impl<const D: usize> Snapshots<D> {
         }
         if self.touches {
             self.add(2, CONTACTS, &surfaces::snapshot(simulation, &particles), &of_surfaces)?;
+        }
+        if let Some(bodies) = &self.bodies {
+            self.add(3, BODIES, &bodies.at(&simulation.particles, &particles), &of_bodies)?;
         }
         self.add(0, SERIES, &particles, &file)?;
         self.mark.written += 1;

@@ -82,6 +82,11 @@ impl Scene {
         builder.refuse_overlap(&loads.contacts)?;
         builder.refuse_overlapping_bodies(&loads.contacts)?;
         let mut particles = builder.particles;
+        // An outline clips a whole picture, so it needs all bodies.
+        let has_outline = |body: usize| particles.outlines.iter().any(|outline| outline.body as usize == body);
+        if !(0..bodies.len()).all(has_outline) {
+            particles.outlines.clear();
+        }
         loads.contacts.anchor(&particles.position, 0.0);
         particles.set_internal_to_rest(&bodies);
         let clock = Clock::new(self.time.step, self.time.max_halvings);

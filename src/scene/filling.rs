@@ -7,9 +7,9 @@ use super::{BuildError, Scene};
 use crate::grid::{Grid, indices};
 use crate::mechanics::loads::CurveError;
 use crate::mechanics::reference::GridReset;
-use crate::particles::Particles;
+use crate::particles::{Outline, Particles};
 use crate::shape::{
-    CloudPoint, Facet, Filling, GridBox, Layout, NoSurface, SURFACE_DEPTH, Shape, around, cloud_surface, fill,
+    CloudPoint, Facet, Fill, Filling, GridBox, Layout, NoSurface, SURFACE_DEPTH, Shape, around, cloud_surface, fill,
 };
 use crate::simulation::Simulation;
 use crate::tensor::Vector;
@@ -84,17 +84,27 @@ impl<const D: usize> Builder<'_, D> {
         }
     }
 
+    /// Keeps the outline of body `number` for pictures. Its corners are as far apart as two particles of the default number per cell.
+    fn outline(&mut self, number: usize, shape: &Shape<D>) {
+        let lines = shape.closed_lines(&self.grid, 0.5 * self.grid.spacing).into_iter().flatten();
+        self.particles.outlines.extend(lines.map(|corners| Outline { body: number as u32, corners }));
+    }
+
     /// Appends the particles of body `number`.
     pub fn fill(&mut self, number: usize, body: &Body) -> Result<(), BuildError> {
         let common = body.velocity.as_ref().map(|v| vector::<D>(v));
         if let Some(shape) = &body.shape {
             let path = format!("bodies[{number}].shape");
             let velocity = common.unwrap_or_else(Vector::zeros);
-            let seeds = fill(&self.grid, &shape.built(&path)?, self.scene.filling(body));
+            let (shape, filling) = (shape.built(&path)?, self.scene.filling(body));
+            let seeds = fill(&self.grid, &shape, filling);
             let seeds = seeds.map_err(|source| BuildError::at(&path, source))?;
             self.make_room(&path, seeds.len())?;
             for seed in seeds {
                 self.push(seed.position, velocity, seed.volume, body.density * seed.volume, number);
+            }
+            if filling.rule == Fill::Cut {
+                self.outline(number, &shape);
             }
         } else if let Some(file) = &body.particles {
             let path = format!("bodies[{number}].particles.file");

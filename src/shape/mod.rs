@@ -13,6 +13,7 @@ mod grid_box;
 mod half_space;
 mod layout;
 mod moments;
+mod outline;
 mod pixels;
 mod polygon;
 mod quadrature;

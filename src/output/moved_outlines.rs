@@ -1,0 +1,88 @@
+//! The outlines of bodies in the plane, moved by the particles near them, for pictures: `bodies_*.vtu`.
+
+use super::Reference;
+use super::fields::padded;
+use super::vtu::{Array, Snapshot};
+use crate::particles::Particles;
+use crate::tensor::{Vector, identity};
+
+/// The largest number of particles that pictures show as cells. More particles are drawn as discs, and need no outline.
+pub(crate) const MAX_CELLS: usize = 20_000;
+
+/// Particles that are farther from a corner than the nearest particle by this part of a grid spacing do not move the corner.
+const REACH: f64 = 0.5;
+
+/// A closed line around a body, or around a hole in it.
+#[derive(Debug)]
+struct Line<const D: usize> {
+    body: u32,
+    corners: Vec<Corner<D>>,
+}
+
+/// A corner X of a line in the undeformed body. Its position is Σ w (x + F (X − X_p)), the mean of the linear motions of particles near it.
+#[derive(Debug)]
+struct Corner<const D: usize> {
+    /// Id, weight w and X − X_p for each of these particles.
+    carriers: Vec<(u32, f64, Vector<f64, D>)>,
+}
+
+/// The outlines of all bodies.
+#[derive(Debug)]
+pub(crate) struct MovedOutlines<const D: usize>(Vec<Line<D>>);
+
+impl<const D: usize> MovedOutlines<D> {
+    /// The outlines of the bodies of `particles`; `None` if they have none, or need none.
+    pub fn of(particles: &Particles<D>, reference: &Reference<D>, spacing: f64) -> Option<Self> {
+        let solid: Vec<usize> = (0..particles.len()).filter(|&p| particles.is_solid(p)).collect();
+        if particles.outlines.is_empty() || solid.len() > MAX_CELLS {
+            return None;
+        }
+        let lines = particles.outlines.iter().map(|outline| {
+            let of_body = solid.iter().filter(|&&p| particles.body[p] == outline.body);
+            let near: Vec<(u32, Vector<f64, D>)> = of_body
+                .map(|&p| particles.id[p])
+                .filter_map(|id| Some((id, *reference.position.get(id as usize)?)))
+                .collect();
+            let corners = outline.corners.iter().map(|at| Corner::of(at, &near, REACH * spacing)).collect();
+            Line { body: outline.body, corners }
+        });
+        Some(Self(lines.collect()))
+    }
+
+    /// The outlines at the time of the snapshot `snapshot`, as segments in the order of the lines.
+    pub fn at(&self, particles: &Particles<D>, snapshot: &Snapshot) -> Snapshot {
+        let places = particles.places();
+        let (mut points, mut bodies) = (Vec::new(), Vec::new());
+        for line in &self.0 {
+            let corners: Vec<[f64; 3]> = line.corners.iter().map(|corner| corner.moved(particles, &places)).collect();
+            let next = corners.iter().cycle().skip(1);
+            points.extend(corners.iter().zip(next).flat_map(|(from, to)| [*from, *to]));
+            bodies.resize(points.len(), f64::from(line.body));
+        }
+        let name = Array { name: "body".into(), components: vec![String::new()], values: bodies, is_index: true };
+        Snapshot { time: snapshot.time, background: snapshot.background, points, arrays: vec![name], corners: 2 }
+    }
+}
+
+impl<const D: usize> Corner<D> {
+    /// The corner at X = `at`, moved by some of the particles `near`: their ids and places X_p in the undeformed body.
+    fn of(at: &Vector<f64, D>, near: &[(u32, Vector<f64, D>)], reach: f64) -> Self {
+        let nearest = near.iter().map(|(_, x)| (at - x).norm()).fold(f64::INFINITY, f64::min);
+        // The weight falls to zero at the reach, so no corner jumps from one particle to another.
+        let weight = |distance: f64| (1.0 - (distance / (nearest + reach)).powi(2)).max(0.0).powi(2);
+        let weighted = near.iter().map(|(id, x)| (*id, weight((at - x).norm()), at - x));
+        let mut carriers: Vec<_> = weighted.filter(|(_, weight, _)| *weight > 0.0).collect();
+        let sum: f64 = carriers.iter().map(|(_, weight, _)| weight).sum();
+        carriers.iter_mut().for_each(|(_, weight, _)| *weight /= sum);
+        Self { carriers }
+    }
+
+    fn moved(&self, particles: &Particles<D>, places: &[u32]) -> [f64; 3] {
+        let of = |(id, weight, from): &(u32, f64, Vector<f64, D>)| {
+            let p = places[*id as usize] as usize;
+            let f = identity::<f64, D>() + particles.displacement_gradient[p];
+            (particles.position[p] + f * from) * *weight
+        };
+        padded(&self.carriers.iter().map(of).sum::<Vector<f64, D>>())
+    }
+}
