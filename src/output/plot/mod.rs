@@ -9,6 +9,7 @@ mod axes;
 mod chart;
 mod colouring;
 mod convergence;
+mod facets;
 mod histories;
 mod html;
 mod neighbours;
@@ -25,7 +26,7 @@ pub use convergence::newton_norms;
 pub use view::View;
 
 use super::files::write_atomically;
-use super::snapshots::obstacles_beside;
+use super::snapshots::{bodies_beside, obstacles_beside};
 use super::vtu::Snapshot;
 use super::{OutputError, pvd};
 use axes::extremes;
@@ -33,6 +34,7 @@ pub(super) use axes::rounded;
 use chart::{Heading, Line, Panel};
 use colouring::Colouring;
 use histories::ROUND_OFF;
+use particles::Surfaces;
 use player::Recording;
 use run_report::{has_inertia, quantity, title};
 use serde_json::Value;
@@ -129,11 +131,11 @@ pub fn plot_run(directory: &Path, look: &Look) -> Result<Vec<PathBuf>, OutputErr
     // The particles are not on the page: the player shows them.
     let mut particles = None;
     if let Some(recording) = &recording {
-        let (snapshot, obstacles) = at_time(directory, &snapshots, look.time)?;
+        let (snapshot, surfaces) = at_time(directory, &snapshots, look.time)?;
         let colouring = Colouring::chosen(&snapshot, look.field.as_deref())?;
         let span = colouring.as_ref().map_or((0.0, 1.0), Colouring::extremes);
         let scene = scene(look, recording, span, &report);
-        particles = Some(("particles", particles::draw(&snapshot, obstacles.as_ref(), &scene, colouring.as_ref())));
+        particles = Some(("particles", particles::draw(&snapshot, &surfaces, &scene, colouring.as_ref())));
     }
     let mut written = Vec::new();
     let mut keep = |file: &str, content: &[u8]| -> Result<(), OutputError> {
@@ -153,12 +155,8 @@ pub fn plot_run(directory: &Path, look: &Look) -> Result<Vec<PathBuf>, OutputErr
     Ok(written)
 }
 
-/// The snapshot nearest to a time, with its obstacles; without a time, the last snapshot.
-fn at_time(
-    directory: &Path,
-    snapshots: &[PathBuf],
-    time: Option<f64>,
-) -> Result<(Snapshot, Option<Snapshot>), OutputError> {
+/// The snapshot nearest to a time, with its surfaces; without a time, the last snapshot.
+fn at_time(directory: &Path, snapshots: &[PathBuf], time: Option<f64>) -> Result<(Snapshot, Surfaces), OutputError> {
     let [earlier @ .., last] = snapshots else { return Err(OutputError::NoSnapshots(directory.to_owned())) };
     let (mut nearest, mut file) = (Snapshot::read(last)?, last);
     for path in earlier.iter().rev() {
@@ -169,12 +167,13 @@ fn at_time(
         }
         (nearest, file) = (snapshot, path);
     }
-    Ok((nearest, obstacles(file)?))
+    Ok((nearest, surfaces(file)?))
 }
 
-/// The obstacles beside a snapshot of particles, if there are any.
-fn obstacles(particles: &Path) -> Result<Option<Snapshot>, OutputError> {
-    obstacles_beside(particles).map(|path| Snapshot::read(&path)).transpose()
+/// The obstacles and the outlines of bodies beside a snapshot of particles, if there are any.
+fn surfaces(particles: &Path) -> Result<Surfaces, OutputError> {
+    let read = |path: Option<PathBuf>| path.map(|path| Snapshot::read(&path)).transpose();
+    Ok(Surfaces { obstacles: read(obstacles_beside(particles))?, bodies: read(bodies_beside(particles))? })
 }
 
 /// The settings that all pictures of the particles of a run have in common.
@@ -292,7 +291,7 @@ pub fn plot_frames(directory: &Path, frames: &Path, look: &Look) -> Result<Vec<P
     for (number, path) in snapshots.iter().enumerate() {
         let snapshot = Snapshot::read(path)?;
         let colouring = Colouring::chosen(&snapshot, look.field.as_deref())?;
-        let svg = particles::draw(&snapshot, obstacles(path)?.as_ref(), &scene, colouring.as_ref());
+        let svg = particles::draw(&snapshot, &surfaces(path)?, &scene, colouring.as_ref());
         let (png, path) = (png::from_svg("a frame", &svg)?, frames.join(format!("frame_{number:04}.png")));
         write_atomically(&path, |file| file.write_all(&png))?;
         written.push(path);

@@ -7,6 +7,10 @@ use std::collections::{HashMap, HashSet};
 /// Corners of the initial polygon of a cell.
 const CORNERS: usize = 16;
 
+/// Layers of cubes in which a wide cell looks for neighbours. The cell reaches half as far as the neighbours, which is the mean distance times
+/// this number.
+const LAYERS: i64 = 2;
+
 /// Particles sorted into cubes.
 pub(super) struct Neighbours<'a> {
     snapshot: &'a Snapshot,
@@ -36,10 +40,11 @@ impl<'a> Neighbours<'a> {
         Self { snapshot, mean, cubes }
     }
 
-    fn around(&self, p: usize) -> impl Iterator<Item = usize> + '_ {
+    /// The other particles in the cube of `p` and in `layers` layers of cubes around it.
+    fn around(&self, p: usize, layers: i64) -> impl Iterator<Item = usize> + '_ {
         let [i, j, k] = cube(self.snapshot, &self.snapshot.points[p], 2.0 * self.mean);
-        let cubes =
-            (-1..=1).flat_map(move |c| (-1..=1).flat_map(move |b| (-1..=1).map(move |a| [i + a, j + b, k + c])));
+        let side = move || -layers..=layers;
+        let cubes = side().flat_map(move |c| side().flat_map(move |b| side().map(move |a| [i + a, j + b, k + c])));
         cubes.filter_map(|cube| self.cubes.get(&cube)).flatten().copied().filter(move |&q| q != p)
     }
 
@@ -48,7 +53,7 @@ impl<'a> Neighbours<'a> {
     pub(super) fn distance(&self, p: usize) -> f64 {
         let points = &self.snapshot.points;
         let square = |q: usize| (0..3).map(|k| (points[q][k] - points[p][k]).powi(2)).sum::<f64>();
-        let mut squares: Vec<f64> = self.around(p).map(square).collect();
+        let mut squares: Vec<f64> = self.around(p, 1).map(square).collect();
         squares.sort_by(f64::total_cmp);
         squares.truncate(2 * self.snapshot.background.dimension as usize);
         let sum: f64 = squares.iter().map(|square| square.sqrt()).sum();
@@ -74,7 +79,7 @@ impl<'a> Neighbours<'a> {
         let centre = plane(p);
         let distance = self.distance(p);
         let reach = self.mean.max(distance);
-        let around: Vec<Vector<f64, 2>> = self.around(p).map(|q| plane(q) - centre).collect();
+        let around: Vec<Vector<f64, 2>> = self.around(p, 1).map(|q| plane(q) - centre).collect();
         // Bisectors with the neighbours, and with mirrored neighbours where none lies within 60° of the opposite direction.
         let mut towards: Vec<_> = around.iter().copied().filter(|v| v.norm() < 2.0 * reach).collect();
         let missing = |v: &Vector<f64, 2>| around.iter().all(|other| other.dot(v) <= 0.5 * other.norm() * v.norm());
@@ -82,19 +87,41 @@ impl<'a> Neighbours<'a> {
         // The corners of a cell in a square lattice are 0.71 distances away.
         let radius = if surface.is_empty() { reach } else { 0.8 * distance };
         towards.extend(surface);
-        let corner = |k: usize| {
-            let angle = (k as f64 + 0.5) * std::f64::consts::TAU / CORNERS as f64;
-            centre + radius * Vector::from([angle.cos(), angle.sin()])
-        };
-        let whole: Vec<_> = (0..CORNERS).map(corner).collect();
-        // Positive at points that are nearer to the neighbour.
-        let beyond = |v: Vector<f64, 2>| move |at: &Vector<f64, 2>| (at - centre - v / 2.0).dot(&v);
-        towards.into_iter().fold(whole, |polygon, v| cut(&polygon, beyond(v)))
+        bisected(centre, radius, towards)
+    }
+
+    /// Voronoi cell of `p` in the plane, a polygon. At the surface of a body the cell reaches beyond the body, so that an outline can cut
+    /// it.
+    pub(super) fn wide_cell(&self, p: usize) -> Vec<Vector<f64, 2>> {
+        let points = &self.snapshot.points;
+        let plane = |p: usize| Vector::from([points[p][0], points[p][1]]);
+        let centre = plane(p);
+        let towards = self.around(p, LAYERS).map(|q| plane(q) - centre).filter(|v| v.norm() > 0.0);
+        bisected(centre, LAYERS as f64 * self.mean, towards)
     }
 }
 
+/// The part of a disc about `centre`, as a polygon, that is nearer to the centre than to the neighbours in the directions `towards`.
+fn bisected(
+    centre: Vector<f64, 2>,
+    radius: f64,
+    towards: impl IntoIterator<Item = Vector<f64, 2>>,
+) -> Vec<Vector<f64, 2>> {
+    let corner = |k: usize| {
+        let angle = (k as f64 + 0.5) * std::f64::consts::TAU / CORNERS as f64;
+        centre + radius * Vector::from([angle.cos(), angle.sin()])
+    };
+    let whole: Vec<_> = (0..CORNERS).map(corner).collect();
+    // Positive at points that are nearer to the neighbour.
+    let beyond = |v: Vector<f64, 2>| move |at: &Vector<f64, 2>| (at - centre - v / 2.0).dot(&v);
+    towards.into_iter().fold(whole, |polygon, v| cut(&polygon, beyond(v)))
+}
+
 /// The part of a convex polygon where the linear function `beyond` is not positive.
-fn cut(polygon: &[Vector<f64, 2>], beyond: impl Fn(&Vector<f64, 2>) -> f64) -> Vec<Vector<f64, 2>> {
+pub(super) fn cut<const D: usize>(
+    polygon: &[Vector<f64, D>],
+    beyond: impl Fn(&Vector<f64, D>) -> f64,
+) -> Vec<Vector<f64, D>> {
     let mut kept = Vec::with_capacity(polygon.len() + 1);
     for (k, from) in polygon.iter().enumerate() {
         let to = &polygon[(k + 1) % polygon.len()];

@@ -3,12 +3,15 @@
 use super::axes::{AXIS_NAME, Axes, LABEL, TICK_LABELS, Ticks, extremes, range};
 use super::chart::Heading;
 use super::colouring::Colouring;
+use super::facets::Facets;
 use super::neighbours::Neighbours;
 use super::palette::{BLACK, BLUE, GREY, LIGHT, viridis};
 use super::svg::{Anchor, Point, Svg, width};
 use super::view::Directions;
 use crate::output::history::AXES;
+use crate::output::moved_outlines::MAX_CELLS;
 use crate::output::vtu::Snapshot;
+use crate::tensor::Vector;
 
 /// Largest width of the drawing.
 const MAX_WIDTH: f64 = 760.0;
@@ -28,8 +31,9 @@ const MAX_LINES: f64 = 100.0;
 /// Largest number of particles that are drawn. Of more particles, an even sample is drawn.
 const MAX_DRAWN: usize = 50_000;
 
-/// Largest number of particles that are drawn as cells. More particles are drawn as discs.
-const MAX_CELLS: usize = 20_000;
+/// Obstacles in space are drawn up to this distance from the box around the particles, relative to the longest edge of the box. The least
+/// distance is a cell.
+const MARGIN: f64 = 0.25;
 
 /// Radius of a disc over the distance of neighbours. The disc has the area of a square of the lattice.
 const RADIUS: f64 = 0.56;
@@ -46,6 +50,15 @@ pub(super) struct Scene {
     pub run: String,
 }
 
+/// What a picture shows beside the particles, at the same time.
+#[derive(Default)]
+pub(super) struct Surfaces {
+    /// The surfaces of obstacles.
+    pub obstacles: Option<Snapshot>,
+    /// The outlines of bodies in the plane.
+    pub bodies: Option<Snapshot>,
+}
+
 /// A picture under construction: the particles `ids` of a snapshot.
 struct Frame<'a> {
     snapshot: &'a Snapshot,
@@ -55,12 +68,7 @@ struct Frame<'a> {
 }
 
 /// The picture as SVG. In one dimension the field is drawn over x.
-pub(super) fn draw(
-    snapshot: &Snapshot,
-    obstacles: Option<&Snapshot>,
-    scene: &Scene,
-    colouring: Option<&Colouring>,
-) -> String {
+pub(super) fn draw(snapshot: &Snapshot, surfaces: &Surfaces, scene: &Scene, colouring: Option<&Colouring>) -> String {
     let span = range([scene.span.0, scene.span.1].into_iter(), 0.0);
     let label = colouring.map_or("particles", |one| &one.label);
     let stride = snapshot.points.len().div_ceil(MAX_DRAWN).max(1);
@@ -84,17 +92,24 @@ pub(super) fn draw(
     let wide = left + size.0 + beside;
     let mut svg = heading.picture(wide, Heading::HEIGHT + size.1 + BELOW);
     let axes = Axes { corner: (left, Heading::HEIGHT), size, x, y };
+    let mut labels = Vec::new();
     match flat {
         Some([right, up]) => {
             grid(&mut svg, snapshot, &axes, [right, up], scale);
             axes.draw(&mut svg, [&ticks[0], &ticks[1]], [AXES[right], AXES[up]], false);
         }
-        None => edges(&mut svg, scene, &axes),
+        None => labels = edges(&mut svg, scene, &axes),
     }
-    frame.bodies(&mut svg, &axes, span);
-    if let (Some(obstacles), Some(plane)) = (obstacles.filter(|one| one.corners == 2), flat) {
-        outlines(&mut svg, obstacles, &axes, plane);
+    match (&surfaces.obstacles, flat) {
+        (Some(obstacles), _) if obstacles.corners == 3 => frame.in_space(&mut svg, &axes, span, Some(obstacles)),
+        (Some(obstacles), Some(plane)) if obstacles.corners == 2 => {
+            frame.bodies(&mut svg, &axes, span, surfaces.bodies.as_ref());
+            outlines(&mut svg, obstacles, &axes, plane);
+        }
+        _ => frame.bodies(&mut svg, &axes, span, surfaces.bodies.as_ref()),
     }
+    // Obstacles may lie under the labels of the box.
+    labels.iter().for_each(|label| label.draw(&mut svg));
     if colouring.is_some() {
         colour_bar(&mut svg, &axes, span, &bar, label);
     }
@@ -113,6 +128,14 @@ impl Scene {
     /// A corner of the box, numbered from 0 to 7.
     fn corner(&self, number: usize) -> [f64; 3] {
         std::array::from_fn(|k| self.bounds[number >> k & 1][k])
+    }
+
+    /// The part of space whose obstacles are drawn, by its lower and upper corner: the box around all particles and [`MARGIN`] around it.
+    fn around(&self, snapshot: &Snapshot) -> [[f64; 3]; 2] {
+        let [low, high] = self.bounds;
+        let longest = (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max);
+        let margin = snapshot.background.spacing.max(MARGIN * longest);
+        [low.map(|x| x - margin), high.map(|x| x + margin)]
     }
 
     /// Horizontal and vertical extent of the picture: the box and one cell around it. In a plane, the extent ends at the grid.
@@ -164,6 +187,20 @@ fn outlines(svg: &mut Svg, obstacles: &Snapshot, axes: &Axes, [right, up]: [usiz
     }
 }
 
+/// The closed lines of outlines of bodies, in the picture. The segments of a line follow each other.
+fn lines(outlines: &Snapshot, axes: &Axes) -> Vec<Vec<Point>> {
+    let mut lines: Vec<Vec<Point>> = Vec::new();
+    let mut end = None;
+    for [from, to] in outlines.points.as_chunks().0 {
+        if end != Some(from) {
+            lines.push(Vec::new());
+        }
+        lines.last_mut().into_iter().for_each(|line| line.push(axes.place((from[0], from[1]))));
+        end = Some(to);
+    }
+    lines
+}
+
 /// The part of a segment in a rectangle, if any (Liang and Barsky, 1984).
 fn clipped([start, end]: [[f64; 2]; 2], ranges: [(f64, f64); 2]) -> Option<[[f64; 2]; 2]> {
     let (mut first, mut last) = (0.0_f64, 1.0_f64);
@@ -182,8 +219,8 @@ fn clipped([start, end]: [[f64; 2]; 2], ranges: [(f64, f64); 2]) -> Option<[[f64
     (first < last).then(|| [at(first), at(last)])
 }
 
-/// Draws the edges of the box behind the particles, and labels along one edge of each axis at the outline.
-fn edges(svg: &mut Svg, scene: &Scene, axes: &Axes) {
+/// Draws the edges of the box behind the particles. Returns labels along one edge of each axis at the outline.
+fn edges(svg: &mut Svg, scene: &Scene, axes: &Axes) -> Vec<Beside> {
     let place = |number: usize| axes.place(scene.directions.project(scene.corner(number)));
     let depth = |number: usize| scene.directions.depth(scene.corner(number));
     let nearest = (0..8).max_by(|&a, &b| depth(a).total_cmp(&depth(b)));
@@ -219,10 +256,10 @@ fn edges(svg: &mut Svg, scene: &Scene, axes: &Axes) {
     let mut drawn: Vec<Beside> = Vec::new();
     for text in names.into_iter().chain(numbers) {
         if drawn.iter().all(|other| !text.covers(other)) {
-            text.draw(svg);
             drawn.push(text);
         }
     }
+    drawn
 }
 
 /// A text below a point, or at its left, at the distance `far`.
@@ -264,30 +301,66 @@ impl Frame<'_> {
         self.colouring?.values.get(p).copied()
     }
 
-    /// Draws the particles: cells in the plane, discs in space. The disc nearest to the eye is drawn last.
-    fn bodies(&self, svg: &mut Svg, axes: &Axes, (low, high): (f64, f64)) {
+    /// The colour of a particle, for a range of values.
+    fn color(&self, p: usize, (low, high): (f64, f64)) -> String {
+        self.value(p).map_or_else(|| BLUE.to_owned(), |value| viridis((value - low) / (high - low)))
+    }
+
+    /// Draws the particles of a plane: cells, cut by the outlines of the bodies if there are any. More particles than [`MAX_CELLS`] are discs.
+    fn bodies(&self, svg: &mut Svg, axes: &Axes, span: (f64, f64), outlines: Option<&Snapshot>) {
         let Self { snapshot, scene: Scene { directions, .. }, ids, .. } = self;
-        let part = |p: usize| self.value(p).map(|value| (value - low) / (high - low));
-        let color = |p: usize| part(p).map_or_else(|| BLUE.to_owned(), viridis);
-        let neighbours = Neighbours::new(snapshot, ids);
-        let finite = |p: &usize| snapshot.points[*p].iter().all(|x| x.is_finite());
-        let mut order: Vec<usize> = ids.iter().copied().filter(finite).collect();
-        if snapshot.background.dimension == 2 && directions.plane() == Some([0, 1]) && ids.len() <= MAX_CELLS {
-            for p in order {
-                let cell = neighbours.cell(p);
-                svg.polygon(cell.iter().map(|corner| axes.place((corner[0], corner[1]))), &color(p));
-            }
+        let in_plane = snapshot.background.dimension == 2 && directions.plane() == Some([0, 1]);
+        if !in_plane || ids.len() > MAX_CELLS {
+            self.in_space(svg, axes, span, None);
             return;
         }
-        let depth = |p: usize| directions.depth(snapshot.points[p]);
-        order.sort_by(|&a, &b| depth(a).total_cmp(&depth(b)));
+        let neighbours = Neighbours::new(snapshot, ids);
+        let finite = |p: &&usize| snapshot.points[**p].iter().all(|x| x.is_finite());
+        let place = |corner: Vector<f64, 2>| axes.place((corner[0], corner[1]));
+        let Some(outlines) = outlines else {
+            for &p in ids.iter().filter(finite) {
+                svg.polygon(neighbours.cell(p).into_iter().map(place), &self.color(p, span));
+            }
+            return;
+        };
+        let lines = lines(outlines, axes);
+        svg.inside(&lines, |svg| {
+            for &p in ids.iter().filter(finite) {
+                svg.polygon(neighbours.wide_cell(p).into_iter().map(place), &self.color(p, span));
+            }
+        });
+        for line in &lines {
+            svg.line(line.iter().chain(line.first()).copied(), BLACK, 0.6);
+        }
+    }
+
+    /// Draws the particles as discs, and the facets of obstacles between those that the obstacles hide and those that they do not. The disc
+    /// nearest to the eye is drawn last.
+    fn in_space(&self, svg: &mut Svg, axes: &Axes, span: (f64, f64), obstacles: Option<&Snapshot>) {
+        let Self { snapshot, scene, ids, .. } = self;
+        let directions = &scene.directions;
+        let neighbours = Neighbours::new(snapshot, ids);
+        let finite = |p: &usize| snapshot.points[*p].iter().all(|x| x.is_finite());
+        let depth = |p: &usize| directions.depth(snapshot.points[*p]);
+        let mut order: Vec<usize> = ids.iter().copied().filter(finite).collect();
+        order.sort_by(|a, b| depth(a).total_cmp(&depth(b)));
         let scale = axes.size.0 / (axes.x.1 - axes.x.0);
-        for p in order {
+        let disc = |svg: &mut Svg, p: usize| {
             let at = axes.place(directions.project(snapshot.points[p]));
-            let color = color(p);
+            let color = self.color(p, span);
             let rim = if snapshot.background.dimension == 3 { GREY } else { &color };
             svg.disc(at, (RADIUS * neighbours.diameter(p) * scale).max(0.7), &color, rim);
+        };
+        let facets = obstacles.map(|obstacles| Facets::new(obstacles, directions, scene.around(snapshot)));
+        let hides = |p: &usize| facets.as_ref().is_some_and(|facets| facets.hide(snapshot.points[*p]));
+        let (hidden, seen): (Vec<usize>, Vec<usize>) = order.into_iter().partition(hides);
+        hidden.into_iter().for_each(|p| disc(svg, p));
+        if let Some(facets) = facets {
+            let (left, right, below, above) = (axes.x.0, axes.x.1, axes.y.0, axes.y.1);
+            let drawing = [(left, below), (right, below), (right, above), (left, above)].map(|at| axes.place(at));
+            svg.inside(&[drawing.to_vec()], |svg| facets.draw(svg, axes));
         }
+        seen.into_iter().for_each(|p| disc(svg, p));
     }
 
     /// The picture in one dimension: the field over x.
@@ -372,7 +445,7 @@ mod tests {
             span: colouring.as_ref().map_or((0.0, 1.0), Colouring::extremes),
             run: "A scene with a title".into(),
         };
-        Ok(draw(snapshot, None, &scene, colouring.as_ref()))
+        Ok(draw(snapshot, &Surfaces::default(), &scene, colouring.as_ref()))
     }
 
     #[test]

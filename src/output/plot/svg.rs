@@ -50,6 +50,22 @@ impl Svg {
         );
     }
 
+    /// Draws what lies inside closed lines. The inside of a line lies at one side of it, the same for all lines.
+    pub(super) fn inside(&mut self, lines: &[Vec<Point>], draw: impl FnOnce(&mut Self)) {
+        let path: String = lines.iter().map(|line| format!("M{}Z", listed(line.iter().copied()))).collect();
+        self.body +=
+            &format!("<clipPath id=\"inside\"><path d=\"{path}\"/></clipPath>\n<g clip-path=\"url(#inside)\">\n");
+        draw(self);
+        self.body += "</g>\n";
+    }
+
+    /// Draws as one translucent layer.
+    pub(super) fn translucent(&mut self, opacity: f64, draw: impl FnOnce(&mut Self)) {
+        self.body += &format!("<g opacity=\"{opacity}\">\n");
+        draw(self);
+        self.body += "</g>\n";
+    }
+
     /// A text with the font size `size`. The point lies on the base line.
     pub(super) fn text(&mut self, (x, y): Point, anchor: Anchor, size: f64, color: &str, text: &str) {
         let (place, turned) = match anchor {
