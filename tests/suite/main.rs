@@ -30,6 +30,7 @@ mod multigrid;
 mod obstacles;
 mod output;
 mod path;
+mod pictures;
 mod plasticity;
 mod points;
 mod program;
