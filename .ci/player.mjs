@@ -11,6 +11,8 @@ const run = JSON.parse(script('<script type="application/json" id="snapshots"'))
 assert.equal(run.times.length, Number(snapshots));
 
 const drawn = [];
+// Triangles by which spots are cut at the outlines of the bodies.
+const cut = [];
 const uploads = [];
 const frames_of_particles = [];
 // Strokes of the pen, in their order.
@@ -19,7 +21,7 @@ const gl = new Proxy({}, {
   get: (_, name) => {
     if (name === "bufferData") return (_target, data) => uploads.push(data.slice());
     if (name === "scissor") return (...frame) => frames_of_particles.push(frame);
-    if (name === "drawArrays") return (_kind, _first, count) => drawn.push(count);
+    if (name === "drawArrays") return (kind, _first, count) => (kind === "POINTS" ? drawn : cut).push(count);
     if (name === "getProgramParameter") return () => true;
     return name === name.toUpperCase() ? name : () => ({});
   },
@@ -56,6 +58,7 @@ assert.ok(left + wide < 960 - 100, "the frame leaves room for the colour bar");
 const first = element("field").options[element("field").value];
 if (run.dimension > 1 && run.channels.some((c) => c.field === "stress")) assert.match(first, /von Mises|plastic/);
 assert.ok(drawn.length === 3 && drawn.every((count) => count === run.shown), `${drawn}`);
+assert.deepEqual(cut, run.bodies[0] ? [(run.bodies[0].length / 4) * 3] : []);
 const shades = () => uploads.filter((data) => data.constructor.name === "Float32Array").at(-1);
 element("field").options.forEach((label, k) => {
   // Colours over all times reach from 0 to 1 somewhere, and those of one time there; what does not vary lies in the middle.

@@ -3,7 +3,7 @@
 (() => {
   const $ = (id) => document.getElementById(id);
   const run = JSON.parse($("snapshots").textContent);
-  const gl = $("scene").getContext("webgl", { antialias: true });
+  const gl = $("scene").getContext("webgl", { antialias: true, stencil: true });
   if (!gl) {
     $("player").textContent = "This browser has no WebGL. particles.png shows the last snapshot.";
     return;
@@ -143,6 +143,7 @@
   gl.bindBuffer(gl.ARRAY_BUFFER, all);
   gl.bufferData(gl.ARRAY_BUFFER, numbers, gl.STATIC_DRAW);
   const shades = { buffer: gl.createBuffer(), values: new Float32Array(count) };
+  const triangles = gl.createBuffer();
   gl.uniform3fv(uniform("colours"), run.colours.flat());
 
   const attribute = (name, c, frame) => {
@@ -163,12 +164,75 @@
     ? [size.left, 0, size.width - size.bar - size.left, size.height - size.below]
     : [0, 0, size.width - size.bar, size.height];
 
+  // Obstacles and outlines that do not move are written once.
+  const present = (list, frame) => list.slice(0, frame + 1).findLast((segments) => segments !== null) ?? [];
+
+  // From here on only the inside of the bodies is drawn, if their outlines are known. The stencil counts how often the outlines go round a
+  // pixel: every segment adds its triangle with the centre, or takes it away if the triangle is turned over.
+  function cutByBodies() {
+    const [start, now] = [present(run.bodies, 0), present(run.bodies, state.frame)];
+    if (!flat || start.length === 0) return;
+    const corners = new Float32Array((start.length / 4) * 12);
+    const at = (list, k, i) => run.origin[i] + (list[k + i] * run.cell) / 1000;
+    for (let k = 0, n = 0; k < start.length; k += 4) {
+      // The centre, then both ends: place at the start, then displacement.
+      n += 4;
+      for (const end of [k, k + 2]) {
+        for (const i of [0, 1]) corners[n++] = at(start, end, i) - centre[i];
+        for (const i of [0, 1]) corners[n++] = at(now, end, i) - at(start, end, i);
+      }
+    }
+    gl.bindBuffer(gl.ARRAY_BUFFER, triangles);
+    gl.bufferData(gl.ARRAY_BUFFER, corners, gl.DYNAMIC_DRAW);
+    const place = (name) => gl.getAttribLocation(program, name);
+    for (const name of ["z", "w", "next", "shade"]) {
+      gl.disableVertexAttribArray(place(name));
+      gl.vertexAttrib1f(place(name), 0);
+    }
+    ["x", "y", "u", "v"].forEach((name, k) => {
+      gl.enableVertexAttribArray(place(name));
+      gl.vertexAttribPointer(place(name), 1, gl.FLOAT, false, 16, 4 * k);
+    });
+    for (const name of ["x_low", "u_low"]) set(name, 0, 0, 0);
+    for (const name of ["x_range", "u_range"]) set(name, 1, 1, 1);
+    set("deformation", state.deformation);
+    set("round", 0);
+    gl.disable(gl.DEPTH_TEST);
+    gl.enable(gl.STENCIL_TEST);
+    gl.colorMask(false, false, false, false);
+    gl.stencilFunc(gl.ALWAYS, 0, 255);
+    gl.stencilOpSeparate(gl.FRONT, gl.KEEP, gl.KEEP, gl.INCR_WRAP);
+    gl.stencilOpSeparate(gl.BACK, gl.KEEP, gl.KEEP, gl.DECR_WRAP);
+    gl.drawArrays(gl.TRIANGLES, 0, corners.length / 4);
+    gl.colorMask(true, true, true, true);
+    gl.stencilFunc(gl.NOTEQUAL, 0, 255);
+    gl.stencilOp(gl.KEEP, gl.KEEP, gl.KEEP);
+  }
+
+  // The next draw shows particles.
+  function particlesNext() {
+    set("x_low", ...rest.map((c, k) => c.low - centre[k]));
+    set("x_range", ...spans(rest));
+    set("u_low", ...displacement.map((c) => c.low));
+    set("u_range", ...spans(displacement));
+    gl.bindBuffer(gl.ARRAY_BUFFER, all);
+    ["x", "y", "z"].forEach((name, k) => attribute(name, rest[k], 0));
+    attribute("next", distance, 0);
+    ["u", "v", "w"].forEach((name, k) => attribute(name, displacement[k], state.frame));
+    gl.bindBuffer(gl.ARRAY_BUFFER, shades.buffer);
+    gl.bufferData(gl.ARRAY_BUFFER, shades.values, gl.DYNAMIC_DRAW);
+    const place = gl.getAttribLocation(program, "shade");
+    gl.enableVertexAttribArray(place);
+    gl.vertexAttribPointer(place, 1, gl.FLOAT, false, 0, 0);
+  }
+
   function drawParticles() {
     const ratio = $("scene").width / size.width;
     gl.viewport(0, 0, $("scene").width, $("scene").height);
     gl.clearColor(1, 1, 1, 1);
     gl.disable(gl.SCISSOR_TEST);
-    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    gl.disable(gl.STENCIL_TEST);
+    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT | gl.STENCIL_BUFFER_BIT);
     // From below, in pixels of the device.
     const [x, y, wide, tall] = frame();
     gl.enable(gl.SCISSOR_TEST);
@@ -181,21 +245,9 @@
     set("scale", (2 * view.zoom) / size.width, (2 * view.zoom) / size.height);
     set("shift", (middle[0] - size.width / 2) / view.zoom, (size.height / 2 - middle[1]) / view.zoom);
     set("depth", 0.9 / (reach * Math.max(1, state.deformation)));
-    set("x_low", ...rest.map((c, k) => c.low - centre[k]));
-    set("x_range", ...spans(rest));
-    set("u_low", ...displacement.map((c) => c.low));
-    set("u_range", ...spans(displacement));
     set("next_span", distance.low, ...spans([distance]));
     set("lift", lift);
-    gl.bindBuffer(gl.ARRAY_BUFFER, all);
-    ["x", "y", "z"].forEach((name, k) => attribute(name, rest[k], 0));
-    attribute("next", distance, 0);
-    ["u", "v", "w"].forEach((name, k) => attribute(name, displacement[k], state.frame));
-    gl.bindBuffer(gl.ARRAY_BUFFER, shades.buffer);
-    gl.bufferData(gl.ARRAY_BUFFER, shades.values, gl.DYNAMIC_DRAW);
-    const place = gl.getAttribLocation(program, "shade");
-    gl.enableVertexAttribArray(place);
-    gl.vertexAttribPointer(place, 1, gl.FLOAT, false, 0, 0);
+    particlesNext();
     // Spots as wide as neighbours are apart, and a little more: on a lattice they leave no gaps.
     const draw = (times, more, paint) => {
       set("spot", lift ? 0 : times * view.zoom * ratio, more * ratio);
@@ -211,6 +263,8 @@
       draw(flat ? 1.42 : 1.5, 4, [0.45, 0.45, 0.45]);
       draw(flat ? 1.42 : 1.5, 1, [1, 1, 1]);
     }
+    cutByBodies();
+    particlesNext();
     gl.enable(gl.DEPTH_TEST);
     set("round", 1);
     set("light", flat ? 0 : 1);
@@ -286,8 +340,7 @@
       pen.strokeStyle = "rgba(0,0,0,.5)";
       const [a, b] = [project(run.origin, now), project(end, now)];
       pen.strokeRect(a[0], b[1], b[0] - a[0], a[1] - b[1]);
-      // Obstacles that do not move are written once.
-      const outline = run.outlines.slice(0, state.frame + 1).findLast((segments) => segments !== null) ?? [];
+      const outline = present(run.outlines, state.frame);
       const at = (k) => project([0, 1, 2].map((i) => (i < 2 ? run.origin[i] + (outline[k + i] * run.cell) / 1000 : 0)), now);
       [pen.strokeStyle, pen.lineWidth] = ["#000", 1.6];
       for (let k = 0; k + 3 < outline.length; k += 4) line(at(k), at(k + 2));

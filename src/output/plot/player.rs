@@ -6,7 +6,7 @@ use super::neighbours::Neighbours;
 use super::palette::VIRIDIS;
 use crate::output::OutputError;
 use crate::output::history::AXES;
-use crate::output::snapshots::obstacles_beside;
+use crate::output::snapshots::{bodies_beside, obstacles_beside};
 use crate::output::vtu::{Array, Background, Snapshot};
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
@@ -59,6 +59,8 @@ pub(super) struct Recording {
     /// The segments of obstacles in the plane at each time: both ends, in thousandths of a cell from the origin of the grid. `None` where the
     /// segments are those of the snapshot before.
     outlines: Vec<Option<Vec<i64>>>,
+    /// The outlines of bodies at each time, in the same form. Empty if there are none.
+    bodies: Vec<Option<Vec<i64>>>,
     /// Number of all snapshots, and of all particles.
     snapshots: usize,
     particles: usize,
@@ -84,6 +86,7 @@ impl Recording {
             background: first.background,
             times: Vec::new(),
             outlines: Vec::new(),
+            bodies: Vec::new(),
             snapshots: files.len(),
             particles,
             shown: ids.len(),
@@ -105,10 +108,10 @@ impl Recording {
             return Err(OutputError::content(path, "has other particles or fields than the first snapshot of the run"));
         }
         self.times.push(snapshot.time);
-        let obstacles = obstacles_beside(path).map(|path| Snapshot::read(&path)).transpose()?;
-        let segments = obstacles.filter(|obstacles| obstacles.corners == 2).map(|obstacles| self.in_cells(&obstacles));
-        let before = self.outlines.iter().rev().flatten().next();
-        self.outlines.push(segments.filter(|segments| Some(segments) != before));
+        let obstacles = self.segments(obstacles_beside(path))?;
+        add_changed(&mut self.outlines, obstacles);
+        let bodies = self.segments(bodies_beside(path))?;
+        add_changed(&mut self.bodies, bodies);
         for axis in 0..3 {
             let (low, high) = extremes(snapshot.points.iter().map(|point| point[axis]));
             self.bounds[0][axis] = self.bounds[0][axis].min(low);
@@ -126,11 +129,14 @@ impl Recording {
         Ok(())
     }
 
-    /// Both ends of all segments, in thousandths of a cell from the origin of the grid.
-    fn in_cells(&self, segments: &Snapshot) -> Vec<i64> {
+    /// Both ends of all segments in a file, in thousandths of a cell from the origin of the grid. `None` without a file, and for triangles.
+    fn segments(&self, file: Option<PathBuf>) -> Result<Option<Vec<i64>>, OutputError> {
+        let Some(path) = file else { return Ok(None) };
+        let segments = Snapshot::read(&path)?;
         let Background { origin, spacing, .. } = self.background;
         let in_plane = segments.points.iter().flat_map(|x| [x[0] - origin[0], x[1] - origin[1]]);
-        in_plane.map(|x| (1000.0 * x / spacing).round() as i64).collect()
+        let in_cells = in_plane.map(|x| (1000.0 * x / spacing).round() as i64);
+        Ok((segments.corners == 2).then(|| in_cells.collect()))
     }
 
     /// Horizontal and vertical axis of the pictures.
@@ -172,7 +178,7 @@ impl Recording {
         let meta = json!({
             "dimension": dimension, "origin": origin, "cell": spacing, "cells": cells, "right": right, "up": up,
             "times": self.times, "snapshots": self.snapshots, "particles": self.particles, "shown": self.shown,
-            "channels": list, "colours": VIRIDIS, "outlines": self.outlines,
+            "channels": list, "colours": VIRIDIS, "outlines": self.outlines, "bodies": self.bodies,
         });
         Played {
             meta: meta.to_string().replace('<', "\\u003c"),
@@ -189,6 +195,13 @@ impl Recording {
         let note = || format!("The page shows {}, evenly chosen; the files have all.", parts.join(" and "));
         (!parts.is_empty()).then(note)
     }
+}
+
+/// Adds segments to a list; `None` where they are those of the snapshot before.
+fn add_changed(list: &mut Vec<Option<Vec<i64>>>, segments: Option<Vec<i64>>) {
+    let before = list.iter().rev().flatten().next();
+    let changed = segments.filter(|segments| Some(segments) != before);
+    list.push(changed);
 }
 
 /// The plane on which a motion is best seen, with the largest displacements `motion` along the axes.
