@@ -8,6 +8,22 @@ const GUARD: usize = 32;
 /// The guard value: a NaN that no computation makes. A law that reads it answers with NaN.
 const MARK: u64 = 0x7ff8_bf4e_e1a3_5eed;
 
+/// The arrays of a foreign function in the order of its arguments: the enum of their indices, and their arena with names and lengths.
+macro_rules! arrays {
+    (($($size:ident),*): $($(#[$about:meta])* $array:ident $name:literal $length:expr,)*) => {
+        #[derive(Clone, Copy)]
+        enum Array {
+            $($(#[$about])* $array),*
+        }
+
+        fn arena($($size: usize),*) -> Arena {
+            Arena::new(&[$(($name, $length)),*])
+        }
+    };
+}
+
+pub(super) use arrays;
+
 /// Arrays in one piece of memory. A write outside an array, by less than the guard, is seen.
 pub(super) struct Arena {
     numbers: Vec<f64>,

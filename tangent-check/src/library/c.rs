@@ -7,13 +7,12 @@ use std::path::{Path, PathBuf};
 
 use libloading::os::unix::{Library, RTLD_LOCAL, RTLD_NOW};
 
-use crate::convention::{Components, Convention, Measure};
+use crate::convention::Convention;
 use crate::law::{CallFailed, Response, Step};
 
-use super::arena::Arena;
+use super::arena::{Arena, arrays};
 use super::{
-    Caller, Description, FULL, Kind, Signature, check_input, check_output, check_properties, failed, resize,
-    values_at_rest,
+    Caller, Description, Kind, Signature, check_input, check_output, check_properties, failed, resize, values_at_rest,
 };
 
 /// The version of `bfree_law.h` that is understood.
@@ -35,17 +34,16 @@ type Function = unsafe extern "C" fn(
     message: *mut c_char,
 ) -> c_int;
 
-/// The indices of the arrays in the arena, in the order of the arguments.
-#[derive(Clone, Copy)]
-enum Array {
-    GradientBefore,
-    Gradient,
-    StateBefore,
-    Properties,
-    Energy,
-    Stress,
-    Tangent,
-    State,
+arrays! {
+    (state, properties):
+    GradientBefore "F_n" 9,
+    Gradient "F" 9,
+    StateBefore "state_n" state,
+    Properties "properties" properties,
+    Energy "energy" 1,
+    Stress "P" 9,
+    Tangent "dP/dF" 81,
+    State "state" state,
 }
 
 /// A loaded law with our own header.
@@ -82,14 +80,12 @@ impl CLaw {
         check_properties(description, &properties)?;
         let (state, values) = state(&library, name)?;
         let state_at_rest = values_at_rest(description, &state, values)?;
-        let full = Components { pairs: FULL.to_vec(), shear: 1.0 };
-        let convention = Convention { measure: Measure::PiolaByGradient, stress: full.clone(), strain: full };
         Ok(Self {
             function,
             arena: arena(state.len(), properties.len()),
             signature: Signature {
                 name: format!("{}, {name}", description.library.display()),
-                convention,
+                convention: Convention::piola_in_rows(),
                 properties,
                 state,
                 state_at_rest,
@@ -163,19 +159,6 @@ impl Caller for CLaw {
         self.energy = Some(self.arena.get(Array::Energy as usize)[0]).filter(|energy| !energy.is_nan());
         check_output(step, &self.signature, response)
     }
-}
-
-fn arena(state: usize, properties: usize) -> Arena {
-    Arena::new(&[
-        ("F_n", 9),
-        ("F", 9),
-        ("state_n", state),
-        ("properties", properties),
-        ("energy", 1),
-        ("P", 9),
-        ("dP/dF", 81),
-        ("state", state),
-    ])
 }
 
 /// The message of a library up to its final zero.

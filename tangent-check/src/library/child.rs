@@ -21,8 +21,8 @@ use std::time::{Duration, Instant};
 
 use crate::law::{CallFailed, Response, Step};
 
-use super::{Caller, Description, Signature, check_input, failed, open, resize};
-use message::{Reader, Writer};
+use super::{Caller, Description, Signature, check_input, failed, open};
+use message::Sent;
 
 /// The hidden first argument that makes a program a child.
 pub const ARGUMENT: &str = "--call-material-law";
@@ -93,20 +93,13 @@ impl Child {
                 started.map_err(|failed| Ended::Said(failed.0))?.0
             }
         };
-        process.request.clear();
-        process.request.step(step);
-        process.exchange(self.limit)?;
-        let mut answer = Reader::new(&process.answer);
-        match answer.byte() {
-            Some(ANSWERED) => {
-                resize(response, &self.signature);
-                answer.response(response).ok_or(Ended::Unreadable)?;
-                self.process = Some(process);
-                Ok(())
-            }
-            Some(_) => Err(Ended::Said(answer.text().ok_or(Ended::Unreadable)?)),
-            None => Err(Ended::Unreadable),
+        process.exchange(step, self.limit)?;
+        *response = process.answered().map_err(|said| said.map_or(Ended::Unreadable, Ended::Said))?;
+        if !self.signature.fits(response) {
+            return Err(Ended::Unreadable);
         }
+        self.process = Some(process);
+        Ok(())
     }
 }
 
@@ -174,7 +167,7 @@ fn signal_name(signal: i32) -> String {
 struct Process {
     child: std::process::Child,
     socket: UnixStream,
-    request: Writer,
+    request: Vec<u8>,
     answer: Vec<u8>,
     /// Shows the output of the law.
     printer: JoinHandle<()>,
@@ -190,22 +183,12 @@ impl Process {
         let library = description.library.display();
         let mut process = Self::spawn(host, printable)
             .map_err(|error| CallFailed(format!("The program {} cannot start: {error}.", host.program.display())))?;
-        process.request.seconds(limit);
-        process.request.description(description);
-        process.exchange(limit).map_err(|ended| {
+        process.exchange(&(limit, description.clone()), limit).map_err(|ended| {
             CallFailed(format!("The library {library}, while it was loaded: {}", ended.sentence(limit)))
         })?;
-        let mut answer = Reader::new(&process.answer);
-        let unreadable =
-            || CallFailed(format!("The program {} answers as no child of this version does.", host.program.display()));
-        match answer.byte() {
-            Some(ANSWERED) => {
-                let signature = answer.signature().ok_or_else(unreadable)?;
-                Ok((process, signature))
-            }
-            Some(_) => Err(CallFailed(answer.text().ok_or_else(unreadable)?)),
-            None => Err(unreadable()),
-        }
+        let unreadable = || format!("The program {} answers as no child of this version does.", host.program.display());
+        let signature = process.answered().map_err(|said| CallFailed(said.unwrap_or_else(unreadable)))?;
+        Ok((process, signature))
     }
 
     fn spawn(host: &Host, printable: &Arc<AtomicUsize>) -> io::Result<Self> {
@@ -221,13 +204,25 @@ impl Process {
             .spawn()?;
         let printable = Arc::clone(printable);
         let printer = thread::spawn(move || show(prints, &printable));
-        Ok(Self { child, socket, request: Writer::default(), answer: Vec::new(), printer })
+        Ok(Self { child, socket, request: Vec::new(), answer: Vec::new(), printer })
     }
 
-    /// Sends the request and waits for the answer.
-    fn exchange(&mut self, limit: Duration) -> Result<(), Ended> {
+    /// The value that the child answered, or its sentence; without either, the answer cannot be read.
+    fn answered<T: Sent>(&self) -> Result<T, Option<String>> {
+        let mut answer = &self.answer[..];
+        match u8::read(&mut answer) {
+            Some(ANSWERED) => T::read(&mut answer).ok_or(None),
+            Some(_) => Err(String::read(&mut answer)),
+            None => Err(None),
+        }
+    }
+
+    /// Sends a request and waits for the answer.
+    fn exchange(&mut self, request: &impl Sent, limit: Duration) -> Result<(), Ended> {
+        self.request.clear();
+        request.write(&mut self.request);
         let deadline = Instant::now() + limit;
-        let exchanged = send(&mut self.socket, self.request.bytes())
+        let exchanged = send(&mut self.socket, &self.request)
             .and_then(|()| receive(&mut self.socket, &mut self.answer, Some(deadline)));
         match exchanged {
             Ok(()) => Ok(()),
@@ -339,37 +334,35 @@ pub fn serve_if_asked() -> Option<ExitCode> {
 pub fn serve() -> io::Result<()> {
     let mut socket = UnixStream::from(io::stdin().as_fd().try_clone_to_owned()?);
     let mut request = Vec::new();
-    let mut answer = Writer::default();
     receive(&mut socket, &mut request, None)?;
-    let mut reader = Reader::new(&request);
-    let limit = reader.seconds().ok_or(ErrorKind::InvalidData)?;
-    let description = reader.description().ok_or(ErrorKind::InvalidData)?;
+    let (limit, description) = <(Duration, Description)>::read(&mut &request[..]).ok_or(ErrorKind::InvalidData)?;
     let watch = Watch::start(limit);
-    let mut caller = match watch.during(|| open(&description)) {
-        Ok(caller) => caller,
-        Err(CallFailed(sentence)) => {
-            answer.sentence(&sentence);
-            return send(&mut socket, answer.bytes());
-        }
-    };
-    answer.byte(ANSWERED);
-    answer.signature(caller.signature());
-    send(&mut socket, answer.bytes())?;
-    let mut step = Step::at_rest();
+    let opened = watch.during(|| open(&description));
+    answer(&mut socket, opened.as_ref().map(|caller| caller.signature()))?;
+    let Ok(mut caller) = opened else { return Ok(()) };
     let mut response = super::empty_response();
     while received(receive(&mut socket, &mut request, None))? {
-        Reader::new(&request).step(&mut step).ok_or(ErrorKind::InvalidData)?;
-        answer.clear();
-        match watch.during(|| caller.call(&step, &mut response)) {
-            Ok(()) => {
-                answer.byte(ANSWERED);
-                answer.response(&response);
-            }
-            Err(CallFailed(sentence)) => answer.sentence(&sentence),
-        }
-        send(&mut socket, answer.bytes())?;
+        let step = Step::read(&mut &request[..]).ok_or(ErrorKind::InvalidData)?;
+        let called = watch.during(|| caller.call(&step, &mut response));
+        answer(&mut socket, called.as_ref().map(|()| &response))?;
     }
     Ok(())
+}
+
+/// Sends a value, or the sentence of a failure.
+fn answer<T: Sent>(socket: &mut UnixStream, result: Result<&T, &CallFailed>) -> io::Result<()> {
+    let mut bytes = Vec::new();
+    match result {
+        Ok(value) => {
+            ANSWERED.write(&mut bytes);
+            value.write(&mut bytes);
+        }
+        Err(CallFailed(sentence)) => {
+            0_u8.write(&mut bytes);
+            sentence.write(&mut bytes);
+        }
+    }
+    send(socket, &bytes)
 }
 
 /// Whether a message came; false if the parent closed the connection.

@@ -13,37 +13,37 @@ mod symbols;
 use std::ffi::{c_char, c_int};
 use std::ops::Range;
 
-use crate::convention::{Convention, Measure};
+use crate::convention::{Components, Convention, Measure};
 use crate::law::{CallFailed, Response, Step};
+use crate::tensor::sum;
 
-use super::arena::Arena;
+use super::arena::{Arena, arrays};
 use super::c::{Shared, text};
 use super::{
     Caller, Description, Kind, Signature, StressState, check_input, check_output, check_plane, check_properties,
     failed, resize, rotate, values_at_rest,
 };
-use interface::{BehaviourData, Function, State, full, symmetric};
+use interface::{BehaviourData, Function, State};
 use symbols::Symbols;
 
 /// The room for a message, as the header demands.
 const MESSAGE: usize = 512;
 
-/// The indices of the arrays in the arena.
-#[derive(Clone, Copy)]
-enum Array {
-    GradientsBefore,
-    ForcesBefore,
-    StateBefore,
-    Gradients,
-    Forces,
-    State,
-    Tangent,
-    Properties,
-    External,
+arrays! {
+    (size, state, properties, external):
+    GradientsBefore "the gradients before the step" size,
+    ForcesBefore "the thermodynamic forces before the step" size,
+    StateBefore "the internal state variables before the step" state,
+    Gradients "the gradients" size,
+    Forces "the thermodynamic forces" size,
+    State "the internal state variables" state,
+    Tangent "K" size * size,
+    Properties "the material properties" properties,
+    External "the external state variables" external,
     /// Time step factor, speed of sound, mass density.
-    Scalars,
+    Scalars "the scalars rdt, speed of sound and mass density" 3,
     /// Stored and dissipated energy before the step, then after it.
-    Energies,
+    Energies "the energies" 4,
 }
 
 /// A loaded behaviour.
@@ -92,7 +92,7 @@ impl Behaviour {
         let convention = convention(finite_strain, plane_strain);
         let external = symbols.external(external)?;
         let source = symbols.pointer(&format!("{name}_src")).map_or(String::new(), |file| format!(" from {file}"));
-        let mut arena = arena(&convention, state.len(), properties.len(), external.len());
+        let mut arena = arena(convention.stress.count(), state.len(), properties.len(), external.len());
         arena.get_mut(Array::Properties as usize).copy_from_slice(&description.properties);
         arena.get_mut(Array::External as usize).copy_from_slice(&external);
         let name = format!("{}, {name}{source}", description.library.display());
@@ -112,8 +112,7 @@ impl Behaviour {
         let [before, after] = if self.finite_strain {
             [step.gradient_before, step.gradient]
         } else {
-            let sum = |i: usize, j: usize| step.strain[i][j] + step.strain_increment[i][j];
-            [step.strain, std::array::from_fn(|i| std::array::from_fn(|j| sum(i, j)))]
+            [step.strain, sum(&step.strain, 1.0, &step.strain_increment)]
         };
         super::write_components(&before, strain, self.arena.get_mut(Array::GradientsBefore as usize));
         super::write_components(&after, strain, self.arena.get_mut(Array::Gradients as usize));
@@ -202,27 +201,11 @@ impl Caller for Behaviour {
 }
 
 fn convention(finite_strain: bool, plane_strain: bool) -> Convention {
-    let (measure, components) = if finite_strain {
-        (Measure::PiolaByGradient, full(plane_strain))
-    } else {
-        (Measure::CauchyByStrain, symmetric(plane_strain))
+    let (measure, components) = match (finite_strain, plane_strain) {
+        (true, false) => (Measure::PiolaByGradient, Components::mfront_gradient()),
+        (true, true) => (Measure::PiolaByGradient, Components::mfront_gradient_plane()),
+        (false, false) => (Measure::CauchyByStrain, Components::mfront()),
+        (false, true) => (Measure::CauchyByStrain, Components::mfront_plane()),
     };
     Convention { measure, stress: components.clone(), strain: components }
-}
-
-fn arena(convention: &Convention, state: usize, properties: usize, external: usize) -> Arena {
-    let size = convention.stress.pairs.len();
-    Arena::new(&[
-        ("the gradients before the step", size),
-        ("the thermodynamic forces before the step", size),
-        ("the internal state variables before the step", state),
-        ("the gradients", size),
-        ("the thermodynamic forces", size),
-        ("the internal state variables", state),
-        ("K", size * size),
-        ("the material properties", properties),
-        ("the external state variables", external),
-        ("the scalars rdt, speed of sound and mass density", 3),
-        ("the energies", 4),
-    ])
 }

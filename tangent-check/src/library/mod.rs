@@ -16,6 +16,7 @@ use std::path::PathBuf;
 use crate::convention::{Components, Convention, Measure, Tensor};
 use crate::law::{CallFailed, Law, Response, Step};
 use crate::matrix::Matrix;
+use crate::tensor::{product3, transposed};
 
 /// A law in a shared library, and how to call it.
 #[derive(Clone, Debug, PartialEq)]
@@ -98,12 +99,24 @@ pub struct Signature {
     pub state_at_rest: Vec<f64>,
 }
 
+impl Signature {
+    /// Whether a response has the sizes of the law.
+    fn fits(&self, response: &Response) -> bool {
+        let Convention { stress, strain, .. } = &self.convention;
+        let [rows, columns] = [stress.count(), strain.count()];
+        let Matrix { entries, .. } = &response.tangent;
+        [response.stress.len(), response.tangent.rows, response.tangent.columns, entries.len(), response.state.len()]
+            == [rows, rows, columns, rows * columns, self.state_at_rest.len()]
+    }
+}
+
 /// A law that can be called with buffers of the caller.
 pub trait Caller: Send {
     /// The interface of the law.
     fn signature(&self) -> &Signature;
 
-    /// The response to a step. The vectors of `response` take the law's sizes; a response that is used again needs no new memory.
+    /// The response to a step. The vectors of `response` take the law's sizes; in this program, a response that is used again needs no new
+    /// memory.
     ///
     /// # Errors
     /// A sentence that names the step: the law refused it, wrote outside its arrays, or answered with a number that is not finite. The
@@ -165,9 +178,6 @@ impl Law for LibraryLaw {
 pub fn empty_response() -> Response {
     Response { stress: Vec::new(), tangent: Matrix::zeros(0, 0), state: Vec::new() }
 }
-
-/// The index pairs of a full tensor, row by row.
-const FULL: [(usize, usize); 9] = [(0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (1, 2), (2, 0), (2, 1), (2, 2)];
 
 /// A failure with the step in which it happened.
 fn failed(step: &Step, what: impl std::fmt::Display) -> CallFailed {
@@ -236,34 +246,17 @@ fn resize(response: &mut Response, signature: &Signature) {
     response.tangent.entries.resize(stress.pairs.len() * strain.pairs.len(), 0.0);
 }
 
-/// The factor of a component: `shear` off the diagonal.
-fn factor((row, column): (usize, usize), shear: f64) -> f64 {
-    if row == column { 1.0 } else { shear }
-}
-
 /// Writes the components of a symmetric tensor.
 fn write_components(tensor: &Tensor, components: &Components, to: &mut [f64]) {
-    for (number, &pair) in to.iter_mut().zip(&components.pairs) {
-        *number = factor(pair, components.shear) * tensor[pair.0][pair.1];
+    for (k, number) in to.iter_mut().enumerate() {
+        *number = components.factor(k) * tensor[components.pairs[k].0][components.pairs[k].1];
     }
 }
 
 /// Rotates the components of a symmetric tensor in place: R t Rᵀ.
 fn rotate(vector: &mut [f64], components: &Components, rotation: &Tensor) {
-    let mut tensor = [[0.0; 3]; 3];
-    for (number, &(row, column)) in vector.iter().zip(&components.pairs) {
-        tensor[row][column] = number / factor((row, column), components.shear);
-        tensor[column][row] = tensor[row][column];
-    }
-    write_components(&product(&product(rotation, &tensor), &transpose(rotation)), components, vector);
-}
-
-fn product(left: &Tensor, right: &Tensor) -> Tensor {
-    std::array::from_fn(|i| std::array::from_fn(|j| (0..3).map(|k| left[i][k] * right[k][j]).sum()))
-}
-
-fn transpose(tensor: &Tensor) -> Tensor {
-    std::array::from_fn(|i| std::array::from_fn(|j| tensor[j][i]))
+    let tensor = components.symmetric_tensor(vector);
+    write_components(&product3(rotation, &tensor, &transposed(rotation)), components, vector);
 }
 
 /// Values at rest: the library's, replaced by those of the description.

@@ -7,8 +7,9 @@ use std::sync::{Mutex, PoisonError};
 
 use crate::convention::{Components, Convention, Measure};
 use crate::law::{CallFailed, Response, Step};
+use crate::tensor::transposed;
 
-use super::arena::Arena;
+use super::arena::{Arena, arrays};
 use super::c::Shared;
 use super::{
     Caller, Description, Kind, Signature, StressState, check_input, check_output, check_plane, failed, resize, rotate,
@@ -58,34 +59,33 @@ type Function = unsafe extern "C" fn(
     cmname_length: usize,
 );
 
-/// The indices of the arrays in the arena, in the order of the arguments.
-#[derive(Clone, Copy)]
-enum Array {
-    Stress,
-    Statev,
-    Ddsdde,
-    Sse,
-    Spd,
-    Scd,
-    Rpl,
-    Ddsddt,
-    Drplde,
-    Drpldt,
-    Stran,
-    Dstran,
-    Time,
-    Dtime,
-    Temp,
-    Dtemp,
-    Predef,
-    Dpred,
-    Props,
-    Coords,
-    Drot,
-    Pnewdt,
-    Celent,
-    Dfgrd0,
-    Dfgrd1,
+arrays! {
+    (size, state, properties):
+    Stress "STRESS" size,
+    Statev "STATEV" state,
+    Ddsdde "DDSDDE" size * size,
+    Sse "SSE" 1,
+    Spd "SPD" 1,
+    Scd "SCD" 1,
+    Rpl "RPL" 1,
+    Ddsddt "DDSDDT" size,
+    Drplde "DRPLDE" size,
+    Drpldt "DRPLDT" 1,
+    Stran "STRAN" size,
+    Dstran "DSTRAN" size,
+    Time "TIME" 2,
+    Dtime "DTIME" 1,
+    Temp "TEMP" 1,
+    Dtemp "DTEMP" 1,
+    Predef "PREDEF" 1,
+    Dpred "DPRED" 1,
+    Props "PROPS" properties,
+    Coords "COORDS" 3,
+    Drot "DROT" 9,
+    Pnewdt "PNEWDT" 1,
+    Celent "CELENT" 1,
+    Dfgrd0 "DFGRD0" 9,
+    Dfgrd1 "DFGRD1" 9,
 }
 
 /// The number of arrays.
@@ -184,7 +184,7 @@ impl Umat {
         let matrices =
             [(Array::Drot, &step.rotation), (Array::Dfgrd0, &step.gradient_before), (Array::Dfgrd1, &step.gradient)];
         for (index, tensor) in matrices {
-            copy(index, super::transpose(tensor).as_flattened());
+            copy(index, transposed(tensor).as_flattened());
         }
         write_components(&step.strain, strain, self.arena.get_mut(Array::Stran as usize));
         write_components(&step.strain_increment, strain, self.arena.get_mut(Array::Dstran as usize));
@@ -322,37 +322,6 @@ fn convention(measure: Measure, stress_state: StressState) -> Result<Convention,
         }
     }
     Ok(Convention { measure, stress: components(stress_state, 1.0), strain: components(stress_state, 2.0) })
-}
-
-fn arena(size: usize, state: usize, properties: usize) -> Arena {
-    let arrays: [(&str, usize); ARRAYS] = [
-        ("STRESS", size),
-        ("STATEV", state),
-        ("DDSDDE", size * size),
-        ("SSE", 1),
-        ("SPD", 1),
-        ("SCD", 1),
-        ("RPL", 1),
-        ("DDSDDT", size),
-        ("DRPLDE", size),
-        ("DRPLDT", 1),
-        ("STRAN", size),
-        ("DSTRAN", size),
-        ("TIME", 2),
-        ("DTIME", 1),
-        ("TEMP", 1),
-        ("DTEMP", 1),
-        ("PREDEF", 1),
-        ("DPRED", 1),
-        ("PROPS", properties),
-        ("COORDS", 3),
-        ("DROT", 9),
-        ("PNEWDT", 1),
-        ("CELENT", 1),
-        ("DFGRD0", 9),
-        ("DFGRD1", 9),
-    ];
-    Arena::new(&arrays)
 }
 
 /// CMNAME: 80 characters, filled with blanks.

@@ -31,9 +31,13 @@ impl Input {
         let fits = |material: &&Material| name.is_none_or(|name| material.name.eq_ignore_ascii_case(name));
         match self.materials.iter().filter(fits).collect::<Vec<_>>().as_slice() {
             [material] => Ok(material),
+            _ if self.materials.is_empty() => Err(format!(
+                "{}: there is no *User Material. Give the file that has it, or the values by --properties and --state.",
+                self.file
+            )),
             found => {
                 let names: Vec<&str> = self.materials.iter().map(|material| material.name.as_str()).collect();
-                let (count, names) = (found.len(), if names.is_empty() { "none".to_owned() } else { names.join(", ") });
+                let (count, names) = (found.len(), names.join(", "));
                 Err(format!("{}: {count} user materials fit. Choose one with --name; there are: {names}.", self.file))
             }
         }

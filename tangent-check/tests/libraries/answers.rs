@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::Command;
 
 use crate::compiled::{c_law, host, mfront, stress_state, umat};
-use crate::steps::{assert_close, double_dot, general_step, green_lagrange, hooke, tensor, vector};
+use crate::steps::{assert_close, double_dot, general_step, green_lagrange, hooke};
 use crate::{LAMBDA, MU};
 use tangent_check::convention::{Components, Measure, Tensor};
 use tangent_check::law::{Law, Response, Step};
@@ -97,7 +97,7 @@ fn neo_hookean_umat() {
         let cauchy = sum(&ZERO, 1.0 / determinant(&f), &kirchhoff);
         assert_close(
             &response.stress,
-            &vector(&cauchy, &tangent_check::library::umat::components(stress_state(plane), 1.0)),
+            &tangent_check::library::umat::components(stress_state(plane), 1.0).vector(&cauchy),
             1e-12,
             "σ",
         );
@@ -140,11 +140,11 @@ fn j2_umat() {
         };
         let response = checked(&description, &make);
         let step = make(open(&description).unwrap().signature());
-        let before = tensor(&step.stress, &components);
+        let before = components.symmetric_tensor(&step.stress);
         let before = product(&product(&step.rotation, &before), &transposed(&step.rotation));
         let (stress, a) = radial_return(&properties, &before, 0.01, &step.strain_increment);
         assert_eq!(a > 0.01, scale == 1.0, "the step is plastic or elastic as planned");
-        assert_close(&response.stress, &vector(&stress, &components), 1e-12, "σ");
+        assert_close(&response.stress, &components.vector(&stress), 1e-12, "σ");
         assert_close(&response.state, &[a], 1e-12, "equivalent plastic strain");
     }
 }
@@ -165,11 +165,11 @@ fn viscoelastic_c() {
     let decay = (-step.length / τ).exp();
     let branch = g * (1.0 - decay) * τ / step.length;
     let components = tangent_check::library::umat::components(StressState::Solid, 1.0);
-    let before = sum(&ZERO, decay, &tensor(&state_before, &components));
+    let before = sum(&ZERO, decay, &components.symmetric_tensor(&state_before));
     let q = sum(&before, branch, &hooke(LAMBDA, MU, &sum(&e, -1.0, &e_n)));
     let p = product(&step.gradient, &sum(&hooke(LAMBDA, MU, &e), 1.0, &q));
     assert_close(&response.stress, p.as_flattened(), 1e-12, "P");
-    assert_close(&response.state, &vector(&q, &components), 1e-12, "Q");
+    assert_close(&response.state, &components.vector(&q), 1e-12, "Q");
 }
 
 /// A law in Fortran through the C header; and the energy, whose derivative is P.
@@ -206,7 +206,7 @@ fn mfront_finite_strain() {
         let p = sum(&ZERO, η, &neo_hookean(&f));
         let components = caller.signature().convention.stress.clone();
         assert_eq!(components.pairs.len(), if plane { 5 } else { 9 });
-        assert_close(&response.stress, &vector(&p, &components), 1e-12, "P");
+        assert_close(&response.stress, &components.vector(&p), 1e-12, "P");
         assert_close(&response.state, &[w.max(greatest)], 1e-12, "greatest energy");
     }
 }
@@ -233,11 +233,12 @@ fn mfront_small_strain() {
         let components =
             Components { shear: 2f64.sqrt(), ..tangent_check::library::umat::components(stress_state(plane), 1.0) };
         assert_eq!([&signature.convention.stress, &signature.convention.strain], [&components; 2]);
-        let turned = product(&product(&step.rotation, &tensor(&step.state, &components)), &transposed(&step.rotation));
+        let turned =
+            product(&product(&step.rotation, &components.symmetric_tensor(&step.state)), &transposed(&step.rotation));
         let strain = sum(&turned, 1.0, &step.strain_increment);
         let stress = hooke(e * ν / ((1.0 + ν) * (1.0 - 2.0 * ν)), e / (2.0 * (1.0 + ν)), &strain);
-        assert_close(&response.stress, &vector(&stress, &components), 1e-12, "σ");
-        assert_close(&response.state, &vector(&strain, &components), 1e-12, "elastic strain");
+        assert_close(&response.stress, &components.vector(&stress), 1e-12, "σ");
+        assert_close(&response.state, &components.vector(&strain), 1e-12, "elastic strain");
     }
 }
 
@@ -281,11 +282,11 @@ fn every_argument() {
     step.stress = vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
     let [stress, engineering] =
         [1.0, 2.0].map(|shear| tangent_check::library::umat::components(StressState::Solid, shear));
-    let turned = product(&product(&step.rotation, &tensor(&step.stress, &stress)), &transposed(&step.rotation));
+    let turned = product(&product(&step.rotation, &stress.symmetric_tensor(&step.stress)), &transposed(&step.rotation));
     let wanted = [
-        &vector(&turned, &stress)[..],
-        &vector(&step.strain, &engineering),
-        &vector(&step.strain_increment, &engineering),
+        &stress.vector(&turned)[..],
+        &engineering.vector(&step.strain),
+        &engineering.vector(&step.strain_increment),
         &[0.25, 0.25, 0.5, 20.0, 0.0],
         step.rotation.as_flattened(),
         step.gradient_before.as_flattened(),

@@ -6,7 +6,7 @@ use std::process::Command;
 use std::time::Duration;
 
 use crate::compiled::{c_law, compile, host, mfront, umat};
-use crate::steps::{assert_close, general_step, vector};
+use crate::steps::{assert_close, general_step};
 use crate::{LAMBDA, MU};
 use tangent_check::convention::Measure;
 use tangent_check::law::{Law, Step};
@@ -48,7 +48,7 @@ fn faults() {
             let stress = sum(&ZERO, 100.0, &good.strain_increment);
             assert_close(
                 &response.stress,
-                &vector(&stress, &tangent_check::library::umat::components(StressState::Solid, 1.0)),
+                &tangent_check::library::umat::components(StressState::Solid, 1.0).vector(&stress),
                 1e-12,
                 "σ after the fault",
             );
@@ -216,7 +216,7 @@ fn utilities() {
         let mut response = empty_response();
         caller.call(&step, &mut response).unwrap();
         let turned = product3(&step.rotation, &step.strain_increment, &transposed(&step.rotation));
-        assert_close(&response.stress, &vector(&turned, &caller.signature().convention.strain), 1e-14, "ROTSIG");
+        assert_close(&response.stress, &caller.signature().convention.strain.vector(&turned), 1e-14, "ROTSIG");
     }
     let unknown = description("unknown", "void mine_(void); void umat_(void) { mine_(); }").unwrap();
     if cfg!(target_os = "linux") {

@@ -1,6 +1,6 @@
 //! Steps for the laws, and the tensors of their formulas.
 
-use tangent_check::convention::{Components, Tensor};
+use tangent_check::convention::Tensor;
 use tangent_check::law::Step;
 use tangent_check::library::Signature;
 use tangent_check::tensor::{IDENTITY, ZERO, product, rotation_about, sum, trace, transposed};
@@ -28,20 +28,6 @@ pub fn hooke(λ: f64, μ: f64, strain: &Tensor) -> Tensor {
 pub fn green_lagrange(f: &Tensor) -> Tensor {
     let difference = sum(&product(&transposed(f), f), -1.0, &IDENTITY);
     sum(&ZERO, 0.5, &difference)
-}
-
-pub fn vector(tensor: &Tensor, components: &Components) -> Vec<f64> {
-    let factor = |row, column| if row == column { 1.0 } else { components.shear };
-    components.pairs.iter().map(|&(row, column)| factor(row, column) * tensor[row][column]).collect()
-}
-
-pub fn tensor(vector: &[f64], components: &Components) -> Tensor {
-    let mut tensor = ZERO;
-    for (number, &(row, column)) in vector.iter().zip(&components.pairs) {
-        tensor[row][column] = number / if row == column { 1.0 } else { components.shear };
-        tensor[column][row] = tensor[row][column];
-    }
-    tensor
 }
 
 /// A step with stretch, shear, rotation and a change of volume, in the plane or out of it. The strains belong to no deformation; a law reads

@@ -1,297 +1,155 @@
-//! Requests and answers as bytes: numbers in little-endian order, vectors and texts after their length.
+//! Requests and answers as bytes: numbers in little-endian order, vectors and texts after their length, structures field by field.
 
 use std::ffi::OsStr;
 use std::os::unix::ffi::OsStrExt;
+use std::path::PathBuf;
 use std::time::Duration;
 
 use crate::convention::{Components, Convention, Measure, Tensor};
 use crate::law::{Response, Step};
 use crate::library::{Description, Kind, Signature, StressState};
+use crate::matrix::Matrix;
 
-/// A message under construction.
-#[derive(Default)]
-pub(super) struct Writer {
-    bytes: Vec<u8>,
+/// A value that a message can hold.
+pub(super) trait Sent: Sized {
+    fn write(&self, to: &mut Vec<u8>);
+
+    /// Takes the value from the front of a message; `None` where the message ends too early or makes no sense.
+    fn read(from: &mut &[u8]) -> Option<Self>;
 }
 
-impl Writer {
-    pub(super) fn bytes(&self) -> &[u8] {
-        &self.bytes
-    }
-
-    pub(super) fn clear(&mut self) {
-        self.bytes.clear();
-    }
-
-    pub(super) fn byte(&mut self, byte: u8) {
-        self.bytes.push(byte);
-    }
-
-    fn count(&mut self, count: usize) {
-        self.bytes.extend((count as u64).to_le_bytes());
-    }
-
-    fn number(&mut self, number: f64) {
-        self.bytes.extend(number.to_le_bytes());
-    }
-
-    pub(super) fn seconds(&mut self, duration: Duration) {
-        self.number(duration.as_secs_f64());
-    }
-
-    fn numbers(&mut self, numbers: &[f64]) {
-        self.count(numbers.len());
-        for &number in numbers {
-            self.number(number);
-        }
-    }
-
-    fn text(&mut self, text: &[u8]) {
-        self.count(text.len());
-        self.bytes.extend(text);
-    }
-
-    fn texts(&mut self, texts: &[String]) {
-        self.count(texts.len());
-        for text in texts {
-            self.text(text.as_bytes());
-        }
-    }
-
-    /// The answer that is a sentence.
-    pub(super) fn sentence(&mut self, sentence: &str) {
-        self.byte(0);
-        self.text(sentence.as_bytes());
-    }
-
-    fn named(&mut self, values: &[(String, f64)]) {
-        self.count(values.len());
-        for (name, value) in values {
-            self.text(name.as_bytes());
-            self.number(*value);
-        }
-    }
-
-    pub(super) fn description(&mut self, description: &Description) {
-        self.text(description.library.as_os_str().as_bytes());
-        match &description.kind {
-            Kind::Umat { material, tangent, temperature } => {
-                self.byte(0);
-                self.text(material.as_bytes());
-                self.measure(*tangent);
-                self.number(*temperature);
+/// Structures, each with its fields in the order of the message.
+macro_rules! sent {
+    ($($kind:ident { $($field:ident),* })*) => {
+        $(impl Sent for $kind {
+            fn write(&self, to: &mut Vec<u8>) {
+                $(self.$field.write(to);)*
             }
-            Kind::Mfront { name, external } => {
-                self.byte(1);
-                self.text(name.as_bytes());
-                self.named(external);
+
+            fn read(from: &mut &[u8]) -> Option<Self> {
+                Some(Self { $($field: Sent::read(from)?),* })
             }
-            Kind::C { name } => {
-                self.byte(2);
-                self.text(name.as_bytes());
+        })*
+    };
+}
+
+sent! {
+    Description { library, kind, properties, state, stress_state }
+    Signature { name, convention, properties, state, state_at_rest }
+    Convention { measure, stress, strain }
+    Components { pairs, shear }
+    Step { time, length, number, gradient_before, gradient, strain, strain_increment, rotation, stress, state }
+    Response { stress, tangent, state }
+    Matrix { rows, columns, entries }
+}
+
+/// Values that pass through another type.
+macro_rules! sent_as {
+    ($($kind:ty as $other:ty: |$value:ident| $there:expr, |$back:ident| $here:expr;)*) => {
+        $(impl Sent for $kind {
+            fn write(&self, to: &mut Vec<u8>) {
+                let $value = self;
+                let sent: $other = $there;
+                sent.write(to);
             }
-        }
-        self.numbers(&description.properties);
-        self.named(&description.state);
-        self.byte(description.stress_state as u8);
+
+            fn read(from: &mut &[u8]) -> Option<Self> {
+                let $back = <$other>::read(from)?;
+                $here
+            }
+        })*
+    };
+}
+
+sent_as! {
+    usize as u64: |value| *value as u64, |count| count.try_into().ok();
+    f64 as u64: |value| value.to_bits(), |bits| Some(f64::from_bits(bits));
+    Duration as f64: |value| value.as_secs_f64(), |seconds| Duration::try_from_secs_f64(seconds).ok();
+    String as Vec<u8>: |text| text.clone().into_bytes(), |bytes| Some(String::from_utf8_lossy(&bytes).into_owned());
+    PathBuf as Vec<u8>: |path| path.as_os_str().as_bytes().to_vec(), |bytes| Some(OsStr::from_bytes(&bytes).into());
+    Tensor as Vec<f64>: |tensor| tensor.as_flattened().to_vec(), |numbers| {
+        let numbers: [f64; 9] = numbers.try_into().ok()?;
+        Some(crate::tensor::from_entries(|i, j| numbers[3 * i + j]))
+    };
+    Measure as u8: |value| Self::ALL.iter().position(|known| known == value).unwrap_or(usize::MAX) as u8,
+        |index| Self::ALL.get(usize::from(index)).copied();
+    StressState as u8: |value| *value as u8, |index| Self::ALL.get(usize::from(index)).copied();
+}
+
+impl Sent for u8 {
+    fn write(&self, to: &mut Vec<u8>) {
+        to.push(*self);
     }
 
-    fn measure(&mut self, measure: Measure) {
-        let index = Measure::ALL.iter().position(|known| *known == measure);
-        self.byte(index.map_or(u8::MAX, |index| index as u8));
-    }
-
-    fn components(&mut self, components: &Components) {
-        self.count(components.pairs.len());
-        for &(row, column) in &components.pairs {
-            self.byte(row as u8);
-            self.byte(column as u8);
-        }
-        self.number(components.shear);
-    }
-
-    pub(super) fn signature(&mut self, signature: &Signature) {
-        self.text(signature.name.as_bytes());
-        self.measure(signature.convention.measure);
-        self.components(&signature.convention.stress);
-        self.components(&signature.convention.strain);
-        self.texts(&signature.properties);
-        self.texts(&signature.state);
-        self.numbers(&signature.state_at_rest);
-    }
-
-    pub(super) fn step(&mut self, step: &Step) {
-        self.number(step.time);
-        self.number(step.length);
-        self.count(step.number);
-        let tensors = [&step.gradient_before, &step.gradient, &step.strain, &step.strain_increment, &step.rotation];
-        for number in tensors.into_iter().flatten().flatten() {
-            self.number(*number);
-        }
-        self.numbers(&step.stress);
-        self.numbers(&step.state);
-    }
-
-    pub(super) fn response(&mut self, response: &Response) {
-        self.numbers(&response.stress);
-        self.numbers(&response.tangent.entries);
-        self.numbers(&response.state);
+    fn read(from: &mut &[u8]) -> Option<Self> {
+        from.split_off_first().copied()
     }
 }
 
-/// A message that is read. All functions give `None` where it ends too early or makes no sense.
-pub(super) struct Reader<'a> {
-    bytes: &'a [u8],
+impl Sent for u64 {
+    fn write(&self, to: &mut Vec<u8>) {
+        to.extend(self.to_le_bytes());
+    }
+
+    fn read(from: &mut &[u8]) -> Option<Self> {
+        let (bytes, rest) = from.split_first_chunk()?;
+        *from = rest;
+        Some(Self::from_le_bytes(*bytes))
+    }
 }
 
-impl<'a> Reader<'a> {
-    pub(super) fn new(bytes: &'a [u8]) -> Self {
-        Self { bytes }
+impl<A: Sent, B: Sent> Sent for (A, B) {
+    fn write(&self, to: &mut Vec<u8>) {
+        self.0.write(to);
+        self.1.write(to);
     }
 
-    pub(super) fn byte(&mut self) -> Option<u8> {
-        let (byte, rest) = self.bytes.split_first()?;
-        self.bytes = rest;
-        Some(*byte)
+    fn read(from: &mut &[u8]) -> Option<Self> {
+        Some((A::read(from)?, B::read(from)?))
+    }
+}
+
+impl<T: Sent> Sent for Vec<T> {
+    fn write(&self, to: &mut Vec<u8>) {
+        self.len().write(to);
+        self.iter().for_each(|value| value.write(to));
     }
 
-    fn eight(&mut self) -> Option<[u8; 8]> {
-        let (bytes, rest) = self.bytes.split_first_chunk()?;
-        self.bytes = rest;
-        Some(*bytes)
+    fn read(from: &mut &[u8]) -> Option<Self> {
+        // Each value takes a byte at least, so that no length asks for more memory than the message has.
+        let count = usize::read(from).filter(|count| *count <= from.len())?;
+        (0..count).map(|_| T::read(from)).collect()
     }
+}
 
-    /// A count of things that take at least a byte each.
-    fn count(&mut self) -> Option<usize> {
-        let count = usize::try_from(u64::from_le_bytes(self.eight()?)).ok()?;
-        (count <= self.bytes.len()).then_some(count)
-    }
-
-    fn number(&mut self) -> Option<f64> {
-        self.eight().map(f64::from_le_bytes)
-    }
-
-    pub(super) fn seconds(&mut self) -> Option<Duration> {
-        Duration::try_from_secs_f64(self.number()?).ok()
-    }
-
-    /// Reads numbers into a vector, whose memory is kept.
-    fn read(&mut self, numbers: &mut Vec<f64>) -> Option<()> {
-        let count = self.count()?;
-        numbers.clear();
-        for _ in 0..count {
-            numbers.push(self.number()?);
+impl Sent for Kind {
+    fn write(&self, to: &mut Vec<u8>) {
+        match self {
+            Self::Umat { material, tangent, temperature } => {
+                (0_u8, material.clone()).write(to);
+                (*tangent, *temperature).write(to);
+            }
+            Self::Mfront { name, external } => ((1_u8, name.clone()), external.clone()).write(to),
+            Self::C { name } => (2_u8, name.clone()).write(to),
         }
-        Some(())
     }
 
-    /// Reads as many numbers as `numbers` has.
-    fn read_all(&mut self, numbers: &mut [f64]) -> Option<()> {
-        if self.count()? != numbers.len() {
-            return None;
-        }
-        for number in numbers {
-            *number = self.number()?;
-        }
-        Some(())
-    }
-
-    fn numbers(&mut self) -> Option<Vec<f64>> {
-        let mut numbers = Vec::new();
-        self.read(&mut numbers)?;
-        Some(numbers)
-    }
-
-    fn text_bytes(&mut self) -> Option<&'a [u8]> {
-        let count = self.count()?;
-        let (text, rest) = self.bytes.split_at_checked(count)?;
-        self.bytes = rest;
-        Some(text)
-    }
-
-    pub(super) fn text(&mut self) -> Option<String> {
-        self.text_bytes().map(|text| String::from_utf8_lossy(text).into_owned())
-    }
-
-    fn texts(&mut self) -> Option<Vec<String>> {
-        (0..self.count()?).map(|_| self.text()).collect()
-    }
-
-    fn named(&mut self) -> Option<Vec<(String, f64)>> {
-        (0..self.count()?).map(|_| Some((self.text()?, self.number()?))).collect()
-    }
-
-    pub(super) fn description(&mut self) -> Option<Description> {
-        let library = OsStr::from_bytes(self.text_bytes()?).into();
-        let kind = match self.byte()? {
-            0 => Kind::Umat { material: self.text()?, tangent: self.measure()?, temperature: self.number()? },
-            1 => Kind::Mfront { name: self.text()?, external: self.named()? },
-            2 => Kind::C { name: self.text()? },
+    fn read(from: &mut &[u8]) -> Option<Self> {
+        Some(match <(u8, String)>::read(from)? {
+            (0, material) => Self::Umat { material, tangent: Sent::read(from)?, temperature: Sent::read(from)? },
+            (1, name) => Self::Mfront { name, external: Sent::read(from)? },
+            (2, name) => Self::C { name },
             _ => return None,
-        };
-        let properties = self.numbers()?;
-        let state = self.named()?;
-        let stress_state = *StressState::ALL.get(usize::from(self.byte()?))?;
-        Some(Description { library, kind, properties, state, stress_state })
-    }
-
-    fn measure(&mut self) -> Option<Measure> {
-        Measure::ALL.get(usize::from(self.byte()?)).copied()
-    }
-
-    fn components(&mut self) -> Option<Components> {
-        let count = self.count()?;
-        let mut index = || self.byte().map(usize::from).filter(|index| *index < 3);
-        let pairs = (0..count).map(|_| Some((index()?, index()?))).collect::<Option<_>>()?;
-        Some(Components { pairs, shear: self.number()? })
-    }
-
-    pub(super) fn signature(&mut self) -> Option<Signature> {
-        Some(Signature {
-            name: self.text()?,
-            convention: Convention { measure: self.measure()?, stress: self.components()?, strain: self.components()? },
-            properties: self.texts()?,
-            state: self.texts()?,
-            state_at_rest: self.numbers()?,
         })
-    }
-
-    fn tensor(&mut self) -> Option<Tensor> {
-        let mut tensor = Tensor::default();
-        for number in tensor.as_flattened_mut() {
-            *number = self.number()?;
-        }
-        Some(tensor)
-    }
-
-    pub(super) fn step(&mut self, step: &mut Step) -> Option<()> {
-        step.time = self.number()?;
-        step.length = self.number()?;
-        step.number = usize::try_from(u64::from_le_bytes(self.eight()?)).ok()?;
-        step.gradient_before = self.tensor()?;
-        step.gradient = self.tensor()?;
-        step.strain = self.tensor()?;
-        step.strain_increment = self.tensor()?;
-        step.rotation = self.tensor()?;
-        self.read(&mut step.stress)?;
-        self.read(&mut step.state)
-    }
-
-    /// Reads into a response that has the law's sizes.
-    pub(super) fn response(&mut self, response: &mut Response) -> Option<()> {
-        self.read_all(&mut response.stress)?;
-        self.read_all(&mut response.tangent.entries)?;
-        self.read_all(&mut response.state)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::law::Step;
-    use crate::library::{empty_response, umat};
+    use crate::library::umat;
 
-    /// A reader gives back the written values; a message that is cut anywhere gives `None` instead of a panic.
+    /// The written values are read back; a message that is cut anywhere gives `None` instead of a panic.
     #[test]
     fn round_trip() {
         let description = Description {
@@ -301,21 +159,13 @@ mod tests {
             state: umat::state(2),
             stress_state: StressState::PlaneStress,
         };
-        let mut writer = Writer::default();
-        writer.description(&description);
-        assert_eq!(Reader::new(writer.bytes()).description(), Some(description));
-        for length in 0..writer.bytes().len() {
-            assert_eq!(Reader::new(&writer.bytes()[..length]).description(), None);
+        let step = Step { number: 13, stress: vec![1.0; 6], ..Step::at_rest() };
+        let mut bytes = Vec::new();
+        (description.clone(), step.clone()).write(&mut bytes);
+        assert_eq!(Sent::read(&mut &bytes[..]), Some((description, step)));
+        for length in 0..bytes.len() {
+            assert_eq!(<(Description, Step)>::read(&mut &bytes[..length]), None);
         }
-        let mut step = Step::at_rest();
-        step.number = 13;
-        step.stress = vec![1.0; 6];
-        writer.clear();
-        writer.step(&step);
-        let mut read = Step::at_rest();
-        assert_eq!(Reader::new(writer.bytes()).step(&mut read), Some(()));
-        assert_eq!(read, step);
-        let mut response = empty_response();
-        assert_eq!(Reader::new(&[255; 40]).response(&mut response), None);
+        assert_eq!(Response::read(&mut &[255; 40][..]), None);
     }
 }

@@ -1,8 +1,6 @@
-//! The C structures of the interface, and the components of MFront's tensors.
+//! The C structures of the interface.
 
 use std::ffi::{c_char, c_int};
-
-use crate::convention::Components;
 
 /// `mfront_gb_State`, and `mfront_gb_InitialState`, whose layout is the same.
 #[repr(C)]
@@ -31,18 +29,3 @@ pub(super) struct BehaviourData {
 
 /// A behaviour.
 pub(super) type Function = unsafe extern "C" fn(*mut BehaviourData) -> c_int;
-
-/// MFront's symmetric tensors: 11, 22, 33, √2·12, √2·13, √2·23, or the first four in plane strain.
-pub(super) fn symmetric(plane_strain: bool) -> Components {
-    crate::convention::Components {
-        shear: std::f64::consts::SQRT_2,
-        ..if plane_strain { Components::abaqus_plane(1.0) } else { Components::abaqus(1.0) }
-    }
-}
-
-/// MFront's tensors: 11, 22, 33, 12, 21, 13, 31, 23, 32, or the first five in plane strain.
-pub(super) fn full(plane_strain: bool) -> Components {
-    let count = if plane_strain { 5 } else { 9 };
-    let pairs = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 0), (0, 2), (2, 0), (1, 2), (2, 1)];
-    Components { pairs: pairs[..count].to_vec(), shear: 1.0 }
-}

@@ -3,7 +3,8 @@
 use std::ffi::{CStr, c_char, c_int, c_ushort};
 use std::ops::Range;
 
-use super::interface::{Function, full, symmetric};
+use super::interface::Function;
+use crate::convention::Components;
 use crate::law::CallFailed;
 use crate::library::c::Shared;
 use crate::library::component;
@@ -53,8 +54,8 @@ impl Variable {
         match kind {
             VariableKind::Scalar => vec![name.clone()],
             VariableKind::Vector(count) => (1..=*count).map(|number| format!("{name}{number}")).collect(),
-            VariableKind::Symmetric(count) => named(&symmetric(false).pairs[..*count]),
-            VariableKind::Tensor(count) => named(&full(false).pairs[..*count]),
+            VariableKind::Symmetric(count) => named(&Components::mfront().pairs[..*count]),
+            VariableKind::Tensor(count) => named(&Components::mfront_gradient().pairs[..*count]),
         }
     }
 }
@@ -226,7 +227,7 @@ impl Symbols {
             let count = variable.components().len();
             match variable.kind {
                 VariableKind::Scalar => {}
-                VariableKind::Symmetric(size) if size == symmetric(self.plane_strain).pairs.len() => {
+                VariableKind::Symmetric(size) if size == if self.plane_strain { 4 } else { 6 } => {
                     places.push(start..start + count);
                 }
                 _ => {
