@@ -7,31 +7,29 @@ mod conversion;
 pub(crate) use conversion::unit_strain;
 pub use conversion::{Configuration, ConversionFailed, cauchy_stress, convert, stress_vector};
 
+use crate::listed::listed;
+
 /// A 3×3 tensor, `t[i][j]`.
 pub type Tensor = [[f64; 3]; 3];
 
-/// The stress and strain that a tangent relates.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Measure {
-    /// ∂P/∂F: first Piola–Kirchhoff stress by the deformation gradient, 9 components each.
-    PiolaByGradient,
-    /// ∂S/∂E: second Piola–Kirchhoff stress by the Green–Lagrange strain.
-    SecondPiolaByGreen,
-    /// ∂σ/∂Δε: Cauchy stress by the strain increment Δε = ln ΔV, with the rotation ΔR of the increment F₁ F₀⁻¹ = ΔV ΔR frozen;
-    /// the classic small-strain UMAT.
-    CauchyByStrain,
-    /// The Jaumann rate of the Kirchhoff stress over J: Abaqus' DDSDDE for finite strain.
-    JaumannKirchhoff,
-    /// The Jaumann rate of the Cauchy stress.
-    JaumannCauchy,
-    /// The Truesdell rate of the Cauchy stress, which is the Oldroyd rate of the Kirchhoff stress over J: the spatial tangent c.
-    Truesdell,
-    /// The Green–Naghdi rate of the Kirchhoff stress over J.
-    GreenNaghdi,
-    /// ∂σ/∂F: Cauchy stress by the deformation gradient, 6 × 9 components.
-    CauchyByGradient,
-    /// ∂τ/∂F: Kirchhoff stress by the deformation gradient, 6 × 9 components.
-    KirchhoffByGradient,
+listed! {
+    /// The stress and strain that a tangent relates.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    Measure, words "The measure in words, with its symbol.":
+    PiolaByGradient "∂P/∂F, first Piola–Kirchhoff stress by the deformation gradient",
+    SecondPiolaByGreen "∂S/∂E, second Piola–Kirchhoff stress by the Green–Lagrange strain",
+    /// Δε = ln ΔV, and ΔR is the rotation of the increment F₁ F₀⁻¹ = ΔV ΔR. The classic small-strain UMAT.
+    CauchyByStrain "∂σ/∂Δε, Cauchy stress by the strain increment with its rotation frozen",
+    /// Abaqus' DDSDDE for finite strain.
+    JaumannKirchhoff "the Jaumann rate of the Kirchhoff stress over J",
+    JaumannCauchy "the Jaumann rate of the Cauchy stress",
+    /// The Oldroyd rate of the Kirchhoff stress over J, and the spatial tangent c.
+    Truesdell "the Truesdell rate of the Cauchy stress",
+    GreenNaghdi "the Green–Naghdi rate of the Kirchhoff stress over J",
+    /// It has 6 × 9 components.
+    CauchyByGradient "∂σ/∂F, Cauchy stress by the deformation gradient",
+    /// It has 6 × 9 components.
+    KirchhoffByGradient "∂τ/∂F, Kirchhoff stress by the deformation gradient",
 }
 
 /// The order of the components of a tensor, and the factors of its shears.
@@ -63,19 +61,6 @@ const EXPLICIT: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (
 const ENGINEERING: f64 = 2.0;
 
 impl Measure {
-    /// All measures.
-    pub const ALL: [Measure; 9] = [
-        Measure::PiolaByGradient,
-        Measure::SecondPiolaByGreen,
-        Measure::CauchyByStrain,
-        Measure::JaumannKirchhoff,
-        Measure::JaumannCauchy,
-        Measure::Truesdell,
-        Measure::GreenNaghdi,
-        Measure::CauchyByGradient,
-        Measure::KirchhoffByGradient,
-    ];
-
     /// Whether the columns are components of F, which is not symmetric.
     pub fn by_gradient(self) -> bool {
         matches!(self, Self::PiolaByGradient | Self::CauchyByGradient | Self::KirchhoffByGradient)
@@ -90,21 +75,6 @@ impl Measure {
             Self::JaumannKirchhoff | Self::JaumannCauchy | Self::Truesdell | Self::GreenNaghdi => ["σ", "D"],
             Self::CauchyByGradient => ["σ", "F"],
             Self::KirchhoffByGradient => ["τ", "F"],
-        }
-    }
-
-    /// The measure in words, with its symbol.
-    pub fn words(self) -> &'static str {
-        match self {
-            Self::PiolaByGradient => "∂P/∂F, first Piola–Kirchhoff stress by the deformation gradient",
-            Self::SecondPiolaByGreen => "∂S/∂E, second Piola–Kirchhoff stress by the Green–Lagrange strain",
-            Self::CauchyByStrain => "∂σ/∂Δε, Cauchy stress by the strain increment with its rotation frozen",
-            Self::JaumannKirchhoff => "the Jaumann rate of the Kirchhoff stress over J",
-            Self::JaumannCauchy => "the Jaumann rate of the Cauchy stress",
-            Self::Truesdell => "the Truesdell rate of the Cauchy stress",
-            Self::GreenNaghdi => "the Green–Naghdi rate of the Kirchhoff stress over J",
-            Self::CauchyByGradient => "∂σ/∂F, Cauchy stress by the deformation gradient",
-            Self::KirchhoffByGradient => "∂τ/∂F, Kirchhoff stress by the deformation gradient",
         }
     }
 }

@@ -50,7 +50,7 @@ pub fn diagnose(convention: &Convention, observations: &[Observation]) -> Option
         candidates.iter().filter(|candidate| explains(candidate, convention, &observations)).collect();
     let mut diagnosis = match explaining.as_slice() {
         [] => terms::fit(convention, &observations).or_else(|| places::fit(convention, &observations))?,
-        [one] => one.alone(),
+        [one] => Diagnosis::alone(one.sentence.clone()),
         several => class(several, general),
     };
     if let Some(candidate) = explaining.first() {
@@ -128,7 +128,7 @@ fn class(several: &[&Candidate], general: bool) -> Diagnosis {
     let all: Vec<String> = candidates.iter().map(short).collect();
     let sentence =
         format!("{}one of {} that are equal in these states: {}.", mistakes::YOURS, all.len(), all.join("; or "));
-    Diagnosis { sentence, candidates, states_that_tell, coefficient: None, share: 0.0 }
+    Diagnosis { candidates, states_that_tell, ..Diagnosis::alone(sentence) }
 }
 
 /// The mistakes of a kind that are named one by one.

@@ -38,7 +38,7 @@ pub use noise::noise;
 
 use crate::law::CallFailed;
 use estimate::SHARP;
-use tableau::Tableau;
+pub(crate) use tableau::Tableau;
 
 /// The greatest number of extrapolations of the central difference.
 const CENTRAL_ORDER: usize = 5;

@@ -129,6 +129,19 @@ pub struct Report {
     pub notes: Vec<String>,
 }
 
+impl Diagnosis {
+    /// The diagnosis of one mistake that explains all.
+    pub(crate) fn alone(sentence: String) -> Self {
+        Self {
+            candidates: vec![sentence.clone()],
+            sentence,
+            states_that_tell: Vec::new(),
+            coefficient: None,
+            share: 1.0,
+        }
+    }
+}
+
 impl Report {
     /// The worst verdict. A report without findings, or with states of no response alone, is not checked.
     pub fn verdict(&self) -> Verdict {

@@ -60,12 +60,6 @@ impl<T: ToJson> ToJson for [T] {
     }
 }
 
-impl<T: ToJson, const COUNT: usize> ToJson for [T; COUNT] {
-    fn to_json(&self) -> Value {
-        self.as_slice().to_json()
-    }
-}
-
 impl<T: ToJson> ToJson for Vec<T> {
     fn to_json(&self) -> Value {
         self.as_slice().to_json()
@@ -75,9 +69,7 @@ impl<T: ToJson> ToJson for Vec<T> {
 /// An object of names and expressions, or the value of an expression.
 macro_rules! json {
     ({ $($name:literal: $value:expr),* $(,)? }) => {
-        $crate::json::Value::Object(
-            [$(($name.to_owned(), $crate::json::ToJson::to_json(&$value))),*].into_iter().collect(),
-        )
+        $crate::json::Value::object(vec![$(($name, $crate::json::ToJson::to_json(&$value))),*])
     };
     ($value:expr) => {
         $crate::json::ToJson::to_json(&$value)
@@ -93,6 +85,13 @@ impl FromIterator<Value> for Value {
 }
 
 impl Value {
+    /// An object. Each length of an array would compile its own sort of a map.
+    pub(crate) fn object(members: Vec<(&str, Value)>) -> Self {
+        let mut map = Map::new();
+        members.into_iter().for_each(|(name, value)| drop(map.insert(name.to_owned(), value)));
+        Self::Object(map)
+    }
+
     /// Adds a member to an object.
     pub(crate) fn insert(&mut self, name: &str, value: Value) {
         if let Self::Object(members) = self {

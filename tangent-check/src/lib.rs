@@ -82,9 +82,11 @@ pub mod judge;
 pub mod law;
 #[cfg(all(unix, feature = "libraries"))]
 pub mod library;
+mod listed;
 pub mod matrix;
 #[cfg(all(unix, feature = "libraries"))]
 pub mod program;
+mod random;
 pub mod report;
 pub mod roads;
 pub mod states;

@@ -19,6 +19,22 @@ impl Matrix {
         Self { rows, columns, entries: vec![0.0; rows * columns] }
     }
 
+    /// The matrix with these entries.
+    pub fn from_entries(rows: usize, columns: usize, entry: impl Fn(usize, usize) -> f64) -> Self {
+        let entries = (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column)));
+        Self { rows, columns, entries: entries.map(|(row, column)| entry(row, column)).collect() }
+    }
+
+    /// The matrix with these columns, which have `rows` entries each.
+    pub fn from_columns(rows: usize, columns: &[Vec<f64>]) -> Self {
+        Self::from_entries(rows, columns.len(), |row, column| columns[column][row])
+    }
+
+    /// A matrix of the same size with other entries.
+    pub fn mapped(&self, entry: impl Fn(usize, usize) -> f64) -> Self {
+        Self::from_entries(self.rows, self.columns, entry)
+    }
+
     /// The greatest absolute value of the entries; 0 for an empty matrix.
     pub fn greatest(&self) -> f64 {
         self.entries.iter().fold(0.0, |greatest, entry| greatest.max(entry.abs()))

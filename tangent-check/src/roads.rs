@@ -17,13 +17,15 @@
 
 mod cause;
 mod check;
+mod objectivity;
 mod observations;
 mod ranges;
 
-pub use check::{CheckColumns, Perturbation, check_law, check_law_by};
+pub use check::check_law;
 
 use crate::convention::{Convention, Measure, Tensor, unit_strain};
 use crate::law::{CallFailed, Law, Response, Step};
+use crate::listed::listed;
 use crate::tensor::{
     IDENTITY, ZERO, determinant, exponential, finite, inverse, logarithm, polar, product, product3, scaled, sum, trace,
     transposed,
@@ -48,57 +50,19 @@ impl Road {
     }
 }
 
-/// An input of a step that a law may read.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Input {
-    /// Δε.
-    StrainIncrement,
-    /// The strain at the start of the step.
-    Strain,
-    /// F₁.
-    Gradient,
-    /// F₀.
-    GradientBefore,
-    /// ΔR.
-    Rotation,
-    /// The stress at the start of the step.
-    Stress,
-    /// The internal variables at the start of the step.
-    State,
-    /// Δt.
-    Length,
-    /// The time at the start of the step.
-    Time,
-}
-
-impl Input {
-    /// All inputs.
-    pub const ALL: [Input; 9] = [
-        Input::StrainIncrement,
-        Input::Strain,
-        Input::Gradient,
-        Input::GradientBefore,
-        Input::Rotation,
-        Input::Stress,
-        Input::State,
-        Input::Length,
-        Input::Time,
-    ];
-
-    /// The input in words, with its name in Abaqus.
-    pub fn words(self) -> &'static str {
-        match self {
-            Input::StrainIncrement => "the strain increment (DSTRAN)",
-            Input::Strain => "the strain (STRAN)",
-            Input::Gradient => "F at the end of the step (DFGRD1)",
-            Input::GradientBefore => "F at the start of the step (DFGRD0)",
-            Input::Rotation => "the rotation increment (DROT)",
-            Input::Stress => "the stress at the start of the step (STRESS)",
-            Input::State => "the internal variables (STATEV)",
-            Input::Length => "the time increment (DTIME)",
-            Input::Time => "the time (TIME)",
-        }
-    }
+listed! {
+    /// An input of a step that a law may read.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+    Input, words "The input in words, with its name in Abaqus.":
+    StrainIncrement "the strain increment (DSTRAN)",
+    Strain "the strain (STRAN)",
+    Gradient "F at the end of the step (DFGRD1)",
+    GradientBefore "F at the start of the step (DFGRD0)",
+    Rotation "the rotation increment (DROT)",
+    Stress "the stress at the start of the step (STRESS)",
+    State "the internal variables (STATEV)",
+    Length "the time increment (DTIME)",
+    Time "the time (TIME)",
 }
 
 /// A general small strain, without an aligned axis; plane if asked for.
@@ -165,6 +129,9 @@ pub fn roads(inputs: &[Input], measure: Measure) -> Vec<Road> {
         (false, _) => vec![Road::Gradient],
     }
 }
+
+/// So many steps, from all over the paths, show which inputs a law reads and whether it is objective.
+const PROBED: usize = 6;
 
 /// A body along a path: what a step hands to the next.
 #[derive(Clone, Debug)]

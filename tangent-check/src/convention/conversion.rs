@@ -63,18 +63,15 @@ pub fn convert(
     let source = Source::new(tangent, from, to)?;
     let from_place = Place::new(at, from.measure)?;
     let to_place = Place::new(at, to.measure)?;
-    let mut converted = Matrix::zeros(to.stress.count(), to.strain.count());
-    for column in 0..to.strain.count() {
+    let column = |column: usize| {
         let velocity = to_place.velocity(to.measure, &unit_strain(to, column));
         let strain_rate = from_place.strain_rate(from.measure, &velocity);
         let rate = source.rate(&strain_rate)?;
         let cauchy_rate = from_place.cauchy_rate(from.measure, &velocity, &rate);
-        let rate = to_place.stress_rate(to.measure, &velocity, &cauchy_rate);
-        for (row, value) in to.stress.vector(&rate).into_iter().enumerate() {
-            converted[(row, column)] = value;
-        }
-    }
-    Ok(converted)
+        Ok(to.stress.vector(&to_place.stress_rate(to.measure, &velocity, &cauchy_rate)))
+    };
+    let columns: Vec<Vec<f64>> = (0..to.strain.count()).map(column).collect::<Result<_, _>>()?;
+    Ok(Matrix::from_columns(to.stress.count(), &columns))
 }
 
 /// The strain whose component `column` is 1 and whose other components are 0.

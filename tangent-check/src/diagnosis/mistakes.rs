@@ -1,8 +1,7 @@
 //! The list of frequent mistakes. Each turns a right tangent into a wrong one.
 
 use super::observation::{Elsewhere, Measured, Observation, is_shear, spatial};
-use crate::convention::{Components, Convention, Measure};
-use crate::finding::Diagnosis;
+use crate::convention::{Components, Convention, Measure, Tensor};
 use crate::matrix::Matrix;
 use crate::tensor::{ZERO, determinant, polar, product3, transposed};
 use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
@@ -40,8 +39,9 @@ enum Mistake {
     },
     /// All entries are cut to whole numbers.
     WholeNumbers,
-    /// In axes that are turned by the rotation R of F, or back.
+    /// In axes that are turned by the rotation R of F or by ΔR, or back.
     Turned {
+        increment: bool,
         back: bool,
     },
     /// The term by which two rates differ, too much.
@@ -98,18 +98,6 @@ impl Candidate {
         if general && self.shows_in == GENERAL { OTHER_LAW } else { self.shows_in }
     }
 
-    /// The diagnosis if this mistake alone explains the tangent.
-    pub(super) fn alone(&self) -> Diagnosis {
-        let sentence = self.sentence.clone();
-        Diagnosis {
-            candidates: vec![sentence.clone()],
-            sentence,
-            states_that_tell: Vec::new(),
-            coefficient: None,
-            share: 0.0,
-        }
-    }
-
     /// The right tangent with this mistake; `None` if it cannot be applied in this state.
     pub(super) fn applied(&self, convention: &Convention, observation: &Observation) -> Option<Measured> {
         let right = &observation.measured;
@@ -124,30 +112,33 @@ impl Candidate {
                 self.mirrored(convention, &right.tangent)?
             }
             Mistake::WholeNumbers => {
-                let whole = mapped(&right.tangent, |row, column| observation.claimed[(row, column)].trunc());
+                let whole = right.tangent.mapped(|row, column| observation.claimed[(row, column)].trunc());
                 let near = |(whole, right): (&f64, &f64)| (whole - right).abs() < 1.0 + right.abs() * ROUND_OFF;
                 let all = whole.entries.iter().zip(&right.tangent.entries).all(near);
                 all.then_some(whole)?
             }
-            Mistake::Turned { back } => turned(convention, observation, *back)?,
-            Mistake::Sign => mapped(&right.tangent, |row, column| -right.tangent[(row, column)]),
+            Mistake::Turned { increment, back } => {
+                let rotation = if *increment { observation.rotation } else { polar(&observation.at.gradient)?.0 };
+                turned(convention, &right.tangent, &if *back { transposed(&rotation) } else { rotation })
+            }
+            Mistake::Sign => right.tangent.mapped(|row, column| -right.tangent[(row, column)]),
             Mistake::VolumeRatio(power) => {
                 let factor = determinant(&observation.at.gradient).powi(*power);
-                mapped(&right.tangent, |row, column| factor * right.tangent[(row, column)])
+                right.tangent.mapped(|row, column| factor * right.tangent[(row, column)])
             }
             _ => self.converted(convention, observation)?,
         };
         // Converted errors: a greater tangent has greater errors.
         let growth = (tangent.greatest() / right.tangent.greatest()).max(1.0);
         let error = growth * right.error();
-        let errors = mapped(&tangent, |_, _| error);
+        let errors = tangent.mapped(|_, _| error);
         Some(Measured { tangent, errors })
     }
 
     fn rearranged(&self, convention: &Convention, right: &Matrix) -> Matrix {
         let row_is_shear = |row: usize| is_shear(&convention.stress, row);
         let column_is_shear = |column: usize| is_shear(&convention.strain, column);
-        mapped(right, |row, column| match &self.mistake {
+        right.mapped(|row, column| match &self.mistake {
             Mistake::Reordered { rows, columns } => right[(rows[row], columns[column])],
             Mistake::ShearFactors { rows, columns } => {
                 let row_factor = if row_is_shear(row) { *rows } else { 1.0 };
@@ -167,7 +158,7 @@ impl Candidate {
         }
         let transposed = |row: usize, column: usize| right[(column, row)];
         let only = |here: &dyn Fn(usize, usize) -> bool| {
-            mapped(right, |i, j| if here(i, j) { transposed(i, j) } else { right[(i, j)] })
+            right.mapped(|i, j| if here(i, j) { transposed(i, j) } else { right[(i, j)] })
         };
         Some(match &self.mistake {
             Mistake::Copied(Side::Below) => only(&|row, column| row > column),
@@ -175,8 +166,8 @@ impl Candidate {
             Mistake::BlockTransposed { shear } => {
                 only(&|row, column| [row, column].iter().all(|k| is_shear(&convention.stress, *k) == *shear))
             }
-            Mistake::Symmetrised => mapped(right, |row, column| 0.5 * (right[(row, column)] + transposed(row, column))),
-            _ => mapped(right, transposed),
+            Mistake::Symmetrised => right.mapped(|row, column| 0.5 * (right[(row, column)] + transposed(row, column))),
+            _ => right.mapped(transposed),
         })
     }
 
@@ -188,7 +179,7 @@ impl Candidate {
             Mistake::NoGeometricPart => {
                 let truesdell = spatial_form(Measure::Truesdell);
                 let geometric = convert(&Matrix::zeros(6, 6), &truesdell, convention, at)?;
-                Some(mapped(right, |row, column| right[(row, column)] - geometric[(row, column)]))
+                Some(right.mapped(|row, column| right[(row, column)] - geometric[(row, column)]))
             }
             Mistake::OtherMeasure(measure) => {
                 let other = Convention { measure, ..convention.clone() };
@@ -197,7 +188,7 @@ impl Candidate {
             Mistake::RateTerm([from, to]) => {
                 let [from, to] = [from, to].map(|measure| restricted(convention, measure));
                 let term = convert(&Matrix::zeros(right.rows, right.columns), &from, &to, at)?;
-                Some(mapped(right, |row, column| right[(row, column)] + term[(row, column)]))
+                Some(right.mapped(|row, column| right[(row, column)] + term[(row, column)]))
             }
             Mistake::TakenForTruesdell(measure) => {
                 let other = restricted(convention, measure);
@@ -223,21 +214,16 @@ fn convert(
     crate::convention::convert(tangent, from, to, at).ok()
 }
 
-/// Q ℂ Qᵀ: the tangent in axes turned by Q, the rotation of F or its transposed.
-fn turned(convention: &Convention, observation: &Observation, back: bool) -> Option<Matrix> {
-    let (rotation, _) = polar(&observation.at.gradient)?;
-    let q = if back { transposed(&rotation) } else { rotation };
-    let right = &observation.measured.tangent;
-    let mut matrix = right.clone();
-    for column in 0..right.columns {
-        let unit = crate::convention::unit_strain(convention, column);
-        let strain = convention.strain.vector(&product3(&transposed(&q), &unit, &q));
+/// Q ℂ Qᵀ: the tangent in axes turned by Q.
+fn turned(convention: &Convention, right: &Matrix, q: &Tensor) -> Matrix {
+    let column = |k: usize| {
+        let unit = crate::convention::unit_strain(convention, k);
+        let strain = convention.strain.vector(&product3(&transposed(q), &unit, q));
         let stress = convention.stress.symmetric_tensor(&right.times(&strain));
-        for (row, value) in convention.stress.vector(&product3(&q, &stress, &transposed(&q))).into_iter().enumerate() {
-            matrix[(row, column)] = value;
-        }
-    }
-    Some(matrix)
+        convention.stress.vector(&product3(q, &stress, &transposed(q)))
+    };
+    let columns: Vec<Vec<f64>> = (0..right.columns).map(column).collect();
+    Matrix::from_columns(right.rows, &columns)
 }
 
 /// A spatial measure in Abaqus' six components.
@@ -248,17 +234,6 @@ pub(super) fn spatial_form(measure: Measure) -> Convention {
 /// A spatial measure in as many of Abaqus' components as the convention has: six, or four in plane strain.
 fn restricted(convention: &Convention, measure: Measure) -> Convention {
     if convention.plane() { Convention::abaqus_plane(measure) } else { spatial_form(measure) }
-}
-
-/// A matrix of the same size with other entries.
-pub(super) fn mapped(like: &Matrix, entry: impl Fn(usize, usize) -> f64) -> Matrix {
-    let mut matrix = Matrix::zeros(like.rows, like.columns);
-    for row in 0..like.rows {
-        for column in 0..like.columns {
-            matrix[(row, column)] = entry(row, column);
-        }
-    }
-    matrix
 }
 
 /// All mistakes that can be made in this convention.
@@ -281,9 +256,12 @@ pub(super) fn candidates(convention: &Convention) -> Vec<Candidate> {
     let whole = "all entries cut to whole numbers (a name that begins with I to N is an integer in Fortran)";
     all.push(Candidate::new(Mistake::WholeNumbers, whole, "properties in other units"));
     if !convention.measure.by_gradient() {
-        let turned = |back, name: &str| Candidate::new(Mistake::Turned { back }, name, "an anisotropic law");
-        all.push(turned(true, "its axes turned back by the rotation of F"));
-        all.push(turned(false, "its axes turned by the rotation of F once more"));
+        for (increment, rotation) in [(false, "the rotation of F"), (true, "the rotation increment (DROT)")] {
+            for (back, name) in [(true, format!("back by {rotation}")), (false, format!("by {rotation} once more"))] {
+                let name = format!("its axes turned {name}");
+                all.push(Candidate::new(Mistake::Turned { increment, back }, &name, "an anisotropic law"));
+            }
+        }
     }
     let volume = |power, name: &str| Candidate::new(Mistake::VolumeRatio(power), name, VOLUME);
     all.push(volume(1, "an additional factor J (Kirchhoff's stress in place of Cauchy's)"));
@@ -302,6 +280,11 @@ fn elsewhere() -> Vec<Candidate> {
         candidate(Elsewhere::Continuum, "the continuum tangent in place of the algorithmic one", YIELDING),
         candidate(Elsewhere::StartOfStep, "that at the start of the step", MEMORY),
         candidate(Elsewhere::AtRest, "the elastic one at rest, without strain", ELASTIC),
+        candidate(
+            Elsewhere::Heated,
+            "that at a strain without its thermal part, or with one that the stress lacks",
+            ELASTIC,
+        ),
     ]
 }
 

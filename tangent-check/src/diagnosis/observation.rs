@@ -1,6 +1,6 @@
 //! A checked state, as a diagnosis sees it.
 
-use crate::convention::{Components, Configuration, Convention, Measure};
+use crate::convention::{Components, Configuration, Convention, Measure, Tensor};
 use crate::matrix::Matrix;
 use crate::tensor::{IDENTITY, determinant, norm, polar, product, sum, transposed};
 
@@ -23,6 +23,8 @@ pub enum Elsewhere {
     StartOfStep,
     /// At rest, without strain.
     AtRest,
+    /// In a state whose strain differs by a multiple of I, the same in all states.
+    Heated,
 }
 
 /// A measured tangent.
@@ -41,6 +43,8 @@ pub struct Observation {
     pub name: String,
     /// F₀, F₁ and the Cauchy stress.
     pub at: Configuration,
+    /// ΔR.
+    pub rotation: Tensor,
     /// The tangent as claimed.
     pub claimed: Matrix,
     /// The right tangent, by differences.

@@ -23,8 +23,7 @@ pub(super) fn fit(convention: &Convention, observations: &[Observation]) -> Opti
     };
     let verb = if place.starts_with("the entries") { "are" } else { "is" };
     let sentence = format!("Your tangent is the right one, but {place} {verb} {wrong}.");
-    let candidates = vec![sentence.clone()];
-    Some(Diagnosis { sentence, candidates, states_that_tell: Vec::new(), coefficient: factor, share: 1.0 })
+    Some(Diagnosis { coefficient: factor, ..Diagnosis::alone(sentence) })
 }
 
 impl Support {

@@ -1,6 +1,6 @@
 //! Terms with one coefficient: what is missing in a tangent, or too much.
 
-use super::mistakes::{mapped, spatial_form};
+use super::mistakes::spatial_form;
 use super::observation::{AGREEMENT, Observation, VISIBLE, distance, spatial};
 use crate::convention::{Components, Configuration, Convention, Measure, Tensor, convert};
 use crate::finding::Diagnosis;
@@ -62,7 +62,7 @@ impl Term {
             Term::Deviator => {
                 let volume = dyad(&truesdell, &IDENTITY, &IDENTITY);
                 let identity = identity(&truesdell);
-                spatial(mapped(&identity, |i, j| identity[(i, j)] - volume[(i, j)] / 3.0))
+                spatial(identity.mapped(|i, j| identity[(i, j)] - volume[(i, j)] / 3.0))
             }
             Term::Geometric => self.geometric(convention, at),
             Term::MaterialVolume => material.then(|| dyad(convention, &IDENTITY, &IDENTITY)),
@@ -87,7 +87,7 @@ impl Term {
 fn dyad(convention: &Convention, a: &Tensor, b: &Tensor) -> Matrix {
     let rows = convention.stress.vector(a);
     let columns = derivative(&convention.strain, b);
-    mapped(&Matrix::zeros(rows.len(), columns.len()), |row, column| rows[row] * columns[column])
+    Matrix::from_entries(rows.len(), columns.len(), |row, column| rows[row] * columns[column])
 }
 
 /// ∂(b : ε)/∂ε_k for each component of the strain.
@@ -101,14 +101,9 @@ fn derivative(strain: &Components, b: &Tensor) -> Vec<f64> {
 
 /// The identity of symmetric tensors.
 fn identity(convention: &Convention) -> Matrix {
-    let mut matrix = Matrix::zeros(convention.stress.count(), convention.strain.count());
-    for column in 0..matrix.columns {
-        let unit = crate::convention::unit_strain(convention, column);
-        for (row, value) in convention.stress.vector(&unit).into_iter().enumerate() {
-            matrix[(row, column)] = value;
-        }
-    }
-    matrix
+    let column = |k: usize| convention.stress.vector(&crate::convention::unit_strain(convention, k));
+    let columns: Vec<Vec<f64>> = (0..convention.strain.count()).map(column).collect();
+    Matrix::from_columns(convention.stress.count(), &columns)
 }
 
 /// The term and its coefficient that explain all deviations; `None` if no single term does.
@@ -123,26 +118,13 @@ pub(super) fn fit(convention: &Convention, observations: &[Observation]) -> Opti
             }
         }
     }
-    let coefficient = first?;
-    let [one] = sentences.as_slice() else {
-        let tell = vec!["large strain and stress, J ≠ 1".to_string()];
-        let sentence = format!("Several terms explain your tangent equally well: {}", sentences.join(" Or: "));
-        return Some(Diagnosis {
-            sentence,
-            candidates: sentences,
-            states_that_tell: tell,
-            coefficient: Some(coefficient),
-            share: 1.0,
-        });
-    };
-    let [sentence, candidates] = [one.clone(), one.clone()];
-    Some(Diagnosis {
-        sentence,
-        candidates: vec![candidates],
-        states_that_tell: Vec::new(),
-        coefficient: Some(coefficient),
-        share: 1.0,
-    })
+    let coefficient = Some(first?);
+    if let [one] = sentences.as_slice() {
+        return Some(Diagnosis { coefficient, ..Diagnosis::alone(one.clone()) });
+    }
+    let sentence = format!("Several terms explain your tangent equally well: {}", sentences.join(" Or: "));
+    let states_that_tell = vec!["large strain and stress, J ≠ 1".to_string()];
+    Some(Diagnosis { candidates: sentences, states_that_tell, coefficient, ..Diagnosis::alone(sentence) })
 }
 
 fn sentence(term: Term, name: &str, suffix: &str, coefficient: f64) -> String {
@@ -165,7 +147,7 @@ fn coefficient(term: Term, power: i32, convention: &Convention, observations: &[
     for observation in observations {
         let factor = determinant(&observation.at.gradient).powi(power);
         let tangent = term.tangent(convention, observation)?;
-        let tangent = mapped(&tangent, |row, column| factor * tangent[(row, column)]);
+        let tangent = tangent.mapped(|row, column| factor * tangent[(row, column)]);
         let error = observation.measured.error();
         for (k, entry) in tangent.entries.iter().enumerate() {
             let deviation = observation.claimed.entries[k] - observation.measured.tangent.entries[k];
@@ -181,7 +163,7 @@ fn coefficient(term: Term, power: i32, convention: &Convention, observations: &[
     let mut told = 0;
     for ((part, error), observation) in parts.iter().zip(observations) {
         let right = &observation.measured.tangent;
-        let wrong = mapped(part, |row, column| right[(row, column)] + coefficient * part[(row, column)]);
+        let wrong = part.mapped(|row, column| right[(row, column)] + coefficient * part[(row, column)]);
         if distance(&wrong, &observation.claimed) > AGREEMENT * error {
             return None;
         }

@@ -6,7 +6,7 @@ use super::estimate::Estimate;
 const SHARE: f64 = 0.1;
 
 /// Ridders' tableau of one difference quotient.
-pub(super) struct Tableau {
+pub(crate) struct Tableau {
     /// The factor rᵖ by which the first extrapolation reduces the leading error.
     factor: f64,
     order: usize,

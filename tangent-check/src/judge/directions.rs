@@ -4,6 +4,7 @@ use super::check::{Loading, explained, measure};
 use super::{Entry, Finding, Matrix, Measured, Verdict, failed, greatest, judge};
 use crate::difference::{ERRORS, Ladder, derivative};
 use crate::law::CallFailed;
+use crate::random::Random;
 
 /// The directions of a check.
 pub struct Directions<'a> {
@@ -63,7 +64,7 @@ pub fn check_directions(
         calls += 1;
         f(w, h)
     };
-    let mut random = Random(seed);
+    let mut random = Random::new(seed);
     let all: Vec<Vec<f64>> = (0..count).map(|_| (0..unknowns).map(|_| random.signed()).collect()).collect();
     let mut claimed = Matrix::zeros(value.len(), count);
     let measured =
@@ -125,18 +126,4 @@ fn locate(
 
 fn deviates(entry: &Entry) -> bool {
     entry.deviation() > ERRORS * entry.error + 1e3 * f64::EPSILON * greatest(&[entry.claimed, entry.measured])
-}
-
-/// SplitMix64 (Steele, Lea and Flood 2014).
-struct Random(u64);
-
-impl Random {
-    /// A number in (−1, 1).
-    fn signed(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-    }
 }

@@ -41,8 +41,6 @@ pub(super) struct Evidence {
     pub columns: Vec<Column>,
     /// ‖C‖, the greatest entry of the measured tangent.
     pub scale: f64,
-    /// The accepted deviation in errors.
-    errors: f64,
     /// The deviation that is inexact: a small part of ‖C‖, the round-off of lost stiffness, or what a loose local iteration explains.
     inexact: f64,
     /// The scale of the law: ‖C‖, or its stiffness at rest if that is greater.
@@ -66,18 +64,7 @@ impl Evidence {
         }
         let jump = measured.jump.map_or(0.0, |jump| jump.slope().min(loose::LOOSE * scale));
         let round_off = LOST * law;
-        Self { columns, scale, errors: ERRORS, inexact: jump.max(SMALL * scale).max(round_off), law }
-    }
-
-    /// The evidence of an exact tangent with round-off `bound`, relative to its greatest entry.
-    pub fn exact(exact: &Matrix, bound: f64) -> Self {
-        let scale = exact.greatest();
-        let error = vec![bound * scale; exact.rows];
-        let estimate = |k| Estimate { value: column(exact, k), error: error.clone() };
-        let columns = (0..exact.columns)
-            .map(|k| Column { accepted: vec![estimate(k)], sides: vec![], kink: false, contradicted: false })
-            .collect();
-        Self { columns, scale, errors: 1.0, inexact: 0.0, law: scale }
+        Self { columns, scale, inexact: jump.max(SMALL * scale).max(round_off), law }
     }
 
     /// ‖C‖; of the claimed tangent, if the measured one is zero.
@@ -108,7 +95,7 @@ impl Evidence {
     fn matches(&self, side: &Estimate, claimed: &[f64], allowed: f64) -> bool {
         let mut entries = claimed.iter().zip(side.value.iter().zip(&side.error));
         // An entry that could not be measured has an infinite error, and deviates by NaN, which is not greater.
-        !entries.any(|(c, (d, e))| (c - d).abs() > (self.errors * e).max(allowed))
+        !entries.any(|(c, (d, e))| (c - d).abs() > (ERRORS * e).max(allowed))
     }
 
     /// The estimate of column `k` from which the claimed column deviates least, in errors.
@@ -125,7 +112,7 @@ impl Evidence {
 
     /// Whether an entry deviates by more than its error allows.
     pub fn deviates(&self, entry: &Entry) -> bool {
-        entry.deviation() > self.errors * entry.error
+        entry.deviation() > ERRORS * entry.error
     }
 
     /// Whether the claimed and the measured tangent are zero within the errors, or below a small part of the scale of the law.
@@ -134,7 +121,7 @@ impl Evidence {
         (0..claimed.columns).all(|k| {
             let nearest = self.nearest(k, &column(claimed, k));
             (0..claimed.rows).all(|i| {
-                let small = |value: f64| value.abs() <= (self.errors * nearest.error[i]).max(nothing);
+                let small = |value: f64| value.abs() <= (ERRORS * nearest.error[i]).max(nothing);
                 small(nearest.value[i]) && small(claimed[(i, k)])
             })
         })

@@ -52,33 +52,6 @@ pub fn judge(name: &str, claimed: &Matrix, measured: &Measured) -> Finding {
     conclude(finding, &evidence, greatest(&measured.value) == 0.0)
 }
 
-/// Compares a claimed tangent with an exact one, such as from dual numbers.
-///
-/// `bound` is the round-off of both, relative to the greatest entry of the exact tangent: 64 ε times a condition number, for instance.
-/// The finding is that of [`judge`]; there are no calls and no noise.
-///
-/// ```
-/// use tangent_check::finding::Verdict;
-/// use tangent_check::judge::judge_exact;
-/// use tangent_check::matrix::Matrix;
-///
-/// let exact = Matrix { rows: 2, columns: 2, entries: vec![2.0, 1.0, 0.0, 3.0] };
-/// let mut claimed = exact.clone();
-/// assert_eq!(judge_exact("an example", &claimed, &exact, 1e-14).verdict, Verdict::Consistent);
-/// claimed[(0, 1)] *= 1.0 + 1e-12;
-/// assert_eq!(judge_exact("an example", &claimed, &exact, 1e-14).verdict, Verdict::Wrong);
-/// ```
-pub fn judge_exact(name: &str, claimed: &Matrix, exact: &Matrix, bound: f64) -> Finding {
-    let mut finding = start(name, claimed, exact.rows, exact.columns);
-    finding.noise = 0.0;
-    let finite = exact.entries.iter().all(|entry| entry.is_finite()) && bound.is_finite();
-    if let Some(fault) = fault(claimed, exact.rows, exact.columns, finite) {
-        return not_checked(finding, Reason::CallFailed(fault));
-    }
-    let evidence = Evidence::exact(exact, bound);
-    conclude(finding, &evidence, false)
-}
-
 /// A finding without a verdict.
 fn start(name: &str, claimed: &Matrix, rows: usize, columns: usize) -> Finding {
     let unknown = Matrix { rows, columns, entries: vec![f64::NAN; rows * columns] };
@@ -105,7 +78,14 @@ fn not_checked(mut finding: Finding, reason: Reason) -> Finding {
 }
 
 /// A finding of a state in which a call failed.
-fn failed(name: &str, claimed: &Matrix, rows: usize, columns: usize, sentence: String, calls: usize) -> Finding {
+pub(crate) fn failed(
+    name: &str,
+    claimed: &Matrix,
+    rows: usize,
+    columns: usize,
+    sentence: String,
+    calls: usize,
+) -> Finding {
     let mut finding = start(name, claimed, rows, columns);
     finding.calls = calls;
     not_checked(finding, Reason::CallFailed(sentence))

@@ -305,6 +305,6 @@ fn tangent(text: &str) -> Result<Measure, String> {
 
 fn reported(text: &str) -> Result<Reported, String> {
     let (name, file) = text.split_once('=').map_or((text, None), |(name, file)| (name, Some(file.into())));
-    let format = Format::from_name(name).map_err(|error| error.to_string().trim_end_matches('.').to_owned())?;
+    let format = Format::from_name(name).map_err(|error| error.trim_end_matches('.').to_owned())?;
     Ok(Reported { format, file })
 }

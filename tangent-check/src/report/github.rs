@@ -25,11 +25,7 @@ fn texts(report: &Report, finding: &Finding) -> (String, String) {
         Verdict::NotChecked => "Tangent not checked",
         Verdict::Wrong => "Wrong tangent",
     };
-    let mut lines = vec![words::finding(report, finding)];
-    if finding.verdict == Verdict::Wrong {
-        lines.extend(report.diagnoses.iter().map(words::diagnosis));
-    }
-    (format!("{tangent}: {}", finding.name), lines.join("\n"))
+    (format!("{tangent}: {}", finding.name), words::with_diagnoses(report, finding).join("\n"))
 }
 
 /// Commands of one kind. The last of too many says how many more there are.

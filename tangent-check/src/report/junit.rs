@@ -3,7 +3,7 @@
 use super::options::Options;
 use super::severity::{Severity, failure_of_the_whole, severity};
 use super::words;
-use crate::finding::{Finding, Report, Verdict};
+use crate::finding::{Finding, Report};
 
 pub(super) fn write(report: &Report, options: &Options) -> String {
     let count = |wanted| report.findings.iter().filter(|finding| severity(finding, options) == wanted).count();
@@ -45,21 +45,13 @@ fn test_case(report: &Report, finding: &Finding, options: &Options) -> String {
         Severity::Warning => format!("      <system-out>{message}</system-out>\n"),
         Severity::Skipped => format!("      <skipped type=\"kink\" message=\"{message}\"/>\n"),
         Severity::Error => {
-            let body = escaped(&diagnoses(report, finding));
+            let body = escaped(&words::with_diagnoses(report, finding)[1..].join("\n"));
             format!("      <failure type=\"{verdict}\" message=\"{message}\">{body}</failure>\n")
         }
     };
     let name = escaped(&finding.name);
     let class = escaped(&report.subject);
     format!("    <testcase name=\"{name}\" classname=\"{class}\">\n{outcome}    </testcase>\n")
-}
-
-/// The diagnoses below a wrong finding.
-fn diagnoses(report: &Report, finding: &Finding) -> String {
-    if finding.verdict != Verdict::Wrong {
-        return String::new();
-    }
-    report.diagnoses.iter().map(words::diagnosis).collect::<Vec<_>>().join("\n")
 }
 
 fn closing(report: &Report, options: &Options) -> String {

@@ -16,70 +16,44 @@ mod words;
 pub use options::Options;
 
 use crate::finding::{Finding, Reason, Report, Verdict};
+use crate::listed::listed;
 use std::fmt;
 use terminal::Rows;
 
-/// A format of a report.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Format {
+listed! {
+    /// A format of a report.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    Format, name "The name on a command line.":
     /// Plain text, at most 100 characters wide: the worst findings in a table and in sentences, the consistent ones in one sentence.
-    Terminal,
+    Terminal "terminal",
     /// [`Format::Terminal`] with all findings in the table.
-    TerminalFull,
-    /// Markdown for the summary of a job: append it to the file `$GITHUB_STEP_SUMMARY`.
-    Markdown,
-    /// JUnit XML after the schema of Jenkins' xUnit plugin (junit-10.xsd).
-    Junit,
-    /// Annotations of GitHub Actions: workflow commands for the standard output.
-    Github,
-    /// A SARIF 2.1.0 log, for code scanning.
-    Sarif,
+    TerminalFull "terminal-full",
+    /// For the summary of a job: append it to the file `$GITHUB_STEP_SUMMARY`.
+    Markdown "markdown",
+    /// XML after the schema of Jenkins' xUnit plugin (junit-10.xsd).
+    Junit "junit",
+    /// Annotations of GitHub Actions, workflow commands for the standard output.
+    Github "github",
+    /// A log after SARIF 2.1.0, for code scanning.
+    Sarif "sarif",
     /// All numbers, for programs. [`JSON_SCHEMA`] describes it.
-    Json,
+    Json "json",
 }
 
 /// The JSON Schema of [`Format::Json`].
 pub const JSON_SCHEMA: &str = include_str!("json.schema.json");
 
-/// A name that is not a format.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct UnknownFormat(pub String);
-
 impl Format {
-    /// All formats.
-    pub const ALL: [Self; 7] =
-        [Self::Terminal, Self::TerminalFull, Self::Markdown, Self::Junit, Self::Github, Self::Sarif, Self::Json];
-
-    /// The name on a command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Terminal => "terminal",
-            Self::TerminalFull => "terminal-full",
-            Self::Markdown => "markdown",
-            Self::Junit => "junit",
-            Self::Github => "github",
-            Self::Sarif => "sarif",
-            Self::Json => "json",
-        }
-    }
-
     /// The format with this name.
     ///
     /// # Errors
     /// No format has this name. The error lists the names.
-    pub fn from_name(name: &str) -> Result<Self, UnknownFormat> {
-        Self::ALL.into_iter().find(|format| format.name() == name).ok_or_else(|| UnknownFormat(name.to_owned()))
+    pub fn from_name(name: &str) -> Result<Self, String> {
+        let names = || Self::ALL.map(Self::name).join(", ");
+        let unknown = || format!("There is no report format \"{}\". Allowed are: {}.", name.escape_debug(), names());
+        Self::ALL.into_iter().find(|format| format.name() == name).ok_or_else(unknown)
     }
 }
-
-impl fmt::Display for UnknownFormat {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let names = Format::ALL.map(Format::name).join(", ");
-        write!(f, "There is no report format \"{}\". Allowed are: {names}.", self.0.escape_debug())
-    }
-}
-
-impl std::error::Error for UnknownFormat {}
 
 /// The name: "not checked".
 impl fmt::Display for Verdict {
@@ -127,16 +101,8 @@ impl Report {
     /// [`Report::exit_code`] is not 0. The message is the report for the terminal.
     #[track_caller]
     pub fn assert_consistent(&self) {
-        self.assert_passes(&Options::default());
-    }
-
-    /// Fails a test unless the tangent passes with these options: consistent, or inexact where that is allowed.
-    ///
-    /// # Panics
-    /// [`Report::exit_code`] is not 0. The message is the report for the terminal.
-    #[track_caller]
-    pub fn assert_passes(&self, options: &Options) {
-        assert!(self.exit_code(options) == 0, "\n{}", write(self, Format::Terminal, options));
+        let options = Options::default();
+        assert!(self.exit_code(&options) == 0, "\n{}", write(self, Format::Terminal, &options));
     }
 }
 

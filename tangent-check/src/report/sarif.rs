@@ -57,7 +57,7 @@ pub(super) fn write(report: &Report, options: &Options) -> String {
     let properties = json!({ "convention": report.convention, "seed": report.seed, "subject": report.subject });
     let run = json!({ "columnKind": "unicodeCodePoints", "properties": properties, "results": results,
                       "tool": json!({ "driver": driver }) });
-    format!("{:#}\n", json!({ "$schema": SCHEMA, "runs": [run], "version": "2.1.0" }))
+    format!("{:#}\n", json!({ "$schema": SCHEMA, "runs": vec![run], "version": "2.1.0" }))
 }
 
 fn descriptor(&Rule(id, level, short, full, help): &Rule) -> Value {
@@ -77,10 +77,7 @@ fn rule(finding: &Finding) -> usize {
 
 /// The first sentence of a message is the title of an alert, so the diagnoses follow the finding.
 fn message(report: &Report, finding: &Finding) -> String {
-    let mut lines = vec![words::finding(report, finding)];
-    if finding.verdict == Verdict::Wrong {
-        lines.extend(report.diagnoses.iter().map(words::diagnosis));
-    }
+    let mut lines = words::with_diagnoses(report, finding);
     lines.push(format!("State: {}", finding.name));
     lines.join("\n")
 }
@@ -99,7 +96,7 @@ fn result(
     let print = format!("{:016x}:{number}", hash(&[id, &report.subject, name]));
     json!({
         "level": level,
-        "locations": [location(report, options, name)],
+        "locations": vec![location(report, options, name)],
         // SARIF 2.1.0, section 3.11.5: braces mark placeholders, and literal braces are doubled.
         "message": json!({ "text": message.replace('{', "{{").replace('}', "}}") }),
         "partialFingerprints": json!({ "tangentCheck/v1": print }),
@@ -110,7 +107,7 @@ fn result(
 
 /// The first line of the source file, if it is known, and the state.
 fn location(report: &Report, options: &Options, name: &str) -> Value {
-    let mut location = json!({ "logicalLocations": [json!({
+    let mut location = json!({ "logicalLocations": vec![json!({
         "fullyQualifiedName": format!("{}/{name}", report.subject), "kind": "state", "name": name })] });
     if let Some(file) = &options.file {
         let (uri, region) = (json!({ "uri": uri(file) }), json!({ "startLine": 1_u32 }));

@@ -160,6 +160,12 @@ pub(super) fn finding(report: &Report, finding: &Finding) -> String {
     }
 }
 
+/// A finding in sentences, and below a wrong one the diagnoses.
+pub(super) fn with_diagnoses(report: &Report, one: &Finding) -> Vec<String> {
+    let diagnoses = report.diagnoses.iter().filter(|_| one.verdict == Verdict::Wrong).map(diagnosis);
+    std::iter::once(finding(report, one)).chain(diagnoses).collect()
+}
+
 /// A part, never rounded up.
 fn part(part: f64) -> String {
     if part > 1.0 - 1e-6 { "all".to_owned() } else { format!("{:.1} %", (1000.0 * part).floor() / 10.0) }

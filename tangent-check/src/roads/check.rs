@@ -3,27 +3,15 @@
 use super::cause::Causes;
 use super::observations::{SIDES, observations};
 use super::ranges;
-use super::{History, Input, Perturbed, Road, Visit, inputs_read, roads};
-use crate::convention::{Convention, Measure, cauchy_stress};
+use super::{History, Input, PROBED, Perturbed, Road, Visit, inputs_read, objectivity, roads};
+use crate::convention::{Convention, Measure};
 use crate::diagnosis::{diagnose, invisible, nearest};
-use crate::finding::{Finding, Reason, Report, Verdict};
-use crate::judge::{Loading, check_along};
+use crate::finding::{Finding, Report, Verdict};
+use crate::judge::{self, Loading, check_along};
 use crate::law::{CallFailed, Law, Response};
 use crate::matrix::Matrix;
 use crate::states::Path;
-use crate::tensor::{norm, product, product3, rotation_about, sum, transposed};
 use std::cell::RefCell;
-
-/// The response with column k perturbed by h.
-pub type Perturbation<'a> = dyn FnMut(usize, f64) -> Result<Vec<f64>, CallFailed> + 'a;
-
-/// A check of a claimed tangent at a response: `judge::check_columns`, or another of the same signature.
-pub type CheckColumns<'a> = dyn FnMut(&str, &Matrix, &[f64], &mut Perturbation) -> Finding + 'a;
-
-/// From so many steps it is taken which inputs the law reads.
-const PROBED: usize = 6;
-/// A stress that errs by more than this of its size after a rotation does not turn with the body.
-const OBJECTIVE: f64 = 1e-6;
 
 /// The findings of one road, one for each visit.
 struct Travelled {
@@ -42,42 +30,6 @@ impl Travelled {
 /// Every step takes stress and internal variables from the response before. A law that reads both F and Δε is checked on both roads;
 /// the report has the findings of the road on which fewer states are wrong, and a note about the other.
 pub fn check_law(law: &mut dyn Law, paths: &[Path], seed: u64) -> Report {
-    // The first state is nearly at rest: its tangent is the stiffness of the law.
-    let mut stiffness = None;
-    let mut check = |name: &str, claimed: &Matrix, perturbed: &mut Perturbed| {
-        let finding = checked(name, claimed, perturbed, stiffness.unwrap_or(0.0));
-        let measured = finding.measured.greatest();
-        stiffness = stiffness.or(Some(measured).filter(|_| finding.error <= SIDES));
-        finding
-    };
-    report(law, paths, seed, &mut check)
-}
-
-/// [`check_law`] with another way to check a tangent column by column.
-pub fn check_law_by(law: &mut dyn Law, paths: &[Path], seed: u64, check: &mut CheckColumns) -> Report {
-    let mut check = |name: &str, claimed: &Matrix, perturbed: &mut Perturbed| match perturbed.value(0, 0.0) {
-        Ok(value) => check(name, claimed, &value, &mut |k, h| perturbed.value(k, h)),
-        Err(failed) => not_checked(name, failed),
-    };
-    report(law, paths, seed, &mut check)
-}
-
-/// The check of the tangent of one perturbed step.
-type Check<'a> = dyn FnMut(&str, &Matrix, &mut Perturbed) -> Finding + 'a;
-
-/// The check by differences. It also looks along the step for jumps of a loose local iteration.
-fn checked(name: &str, claimed: &Matrix, perturbed: &mut Perturbed, stiffness: f64) -> Finding {
-    let value = match perturbed.value(0, 0.0) {
-        Ok(value) => value,
-        Err(failed) => return not_checked(name, failed),
-    };
-    let shared = RefCell::new(perturbed);
-    let size = shared.borrow().size();
-    let loading = Loading { size, respond: &mut |part| shared.borrow_mut().part(part), stiffness };
-    check_along(name, claimed, &value, &mut |k, h| shared.borrow_mut().value(k, h), Some(loading))
-}
-
-fn report(law: &mut dyn Law, paths: &[Path], seed: u64, check: &mut Check) -> Report {
     let convention = law.convention();
     let [stress, strain] = convention.measure.symbols();
     let mut report = Report {
@@ -105,9 +57,10 @@ fn report(law: &mut dyn Law, paths: &[Path], seed: u64, check: &mut Check) -> Re
         report.notes.push(note_of_inputs(&read));
     }
     report.notes.extend(ranges::notes(&law.state_at_rest(), &visits));
-    let travelled: Vec<Travelled> =
-        roads(&read, convention.measure).into_iter().map(|road| travel(law, road, &visits, check)).collect();
-    report.notes.extend(note_of_objectivity(law, &visits));
+    let mut stiffness = None;
+    let all = roads(&read, convention.measure).into_iter();
+    let travelled: Vec<Travelled> = all.map(|road| travel(law, road, &visits, &mut stiffness)).collect();
+    report.notes.extend(objectivity::note(law, &visits));
     let remembers = remembers(law, &visits);
     report.notes.extend(remembers.then(|| REMEMBERS.to_string()));
     report.notes.extend(note_of_roads(&travelled));
@@ -125,20 +78,7 @@ fn report(law: &mut dyn Law, paths: &[Path], seed: u64, check: &mut Check) -> Re
 
 /// A finding without a check, because a call failed.
 fn not_checked(name: &str, failed: CallFailed) -> Finding {
-    Finding {
-        name: name.to_string(),
-        verdict: Verdict::NotChecked,
-        reason: Some(Reason::CallFailed(format!("{name}: {}", failed.0))),
-        worst: None,
-        deviation: 0.0,
-        error: 0.0,
-        noise: 0.0,
-        control: None,
-        calls: 1,
-        claimed: Matrix::zeros(0, 0),
-        measured: Matrix::zeros(0, 0),
-        errors: Matrix::zeros(0, 0),
-    }
+    judge::failed(name, &Matrix::zeros(0, 0), 0, 0, format!("{name}: {}", failed.0), 1)
 }
 
 /// Walks along a path to its end or to the first call that fails.
@@ -233,33 +173,6 @@ fn remembers(law: &mut dyn Law, visits: &[Visit]) -> bool {
     })
 }
 
-/// A law whose stress does not turn with the body: σ(Q F) = Q σ(F) Qᵀ. The check along a frozen rotation cannot see it.
-fn note_of_objectivity(law: &mut dyn Law, visits: &[Visit]) -> Option<String> {
-    let convention = law.convention();
-    let rotation = rotation_about(if convention.plane() { [0.0, 0.0, 0.4] } else { [0.3, -0.5, 0.4] });
-    let mut greatest: f64 = 0.0;
-    for visit in visits.iter().step_by(visits.len().div_ceil(PROBED).max(1)) {
-        let mut turned = visit.step.clone();
-        if !turned.turn_to(&product(&rotation, &visit.step.gradient)) {
-            continue;
-        }
-        let stress = cauchy_stress(&convention, &visit.response.stress, &visit.step.gradient).ok();
-        let other = law
-            .respond(&turned)
-            .ok()
-            .and_then(|response| cauchy_stress(&convention, &response.stress, &turned.gradient).ok());
-        if let Some((stress, other)) = stress.zip(other) {
-            let expected = product3(&rotation, &stress, &transposed(&rotation));
-            greatest = greatest.max(norm(&sum(&other, -1.0, &expected)) / norm(&stress).max(f64::MIN_POSITIVE));
-        }
-    }
-    let text = format!(
-        "The stress does not turn with the body: after a rotation it errs by up to {greatest:.0e} of its size. The law is not objective, and its \
-         tangent can hold only without rotation. Its axes should turn with the body."
-    );
-    (greatest > OBJECTIVE).then_some(text)
-}
-
 fn note_of_roads(travelled: &[Travelled]) -> Option<String> {
     let [gradient, strain] = travelled else {
         return None;
@@ -271,15 +184,31 @@ fn note_of_roads(travelled: &[Travelled]) -> Option<String> {
     Some(format!("{text}: {}, {}. The findings are those of the road with fewer.", words(gradient), words(strain)))
 }
 
-/// Checks all visits on a road.
-fn travel(law: &mut dyn Law, road: Road, visits: &[Visit], check: &mut Check) -> Travelled {
+/// Checks all visits on a road. The first one that is sharp, nearly at rest, gives the stiffness of the law.
+fn travel(law: &mut dyn Law, road: Road, visits: &[Visit], stiffness: &mut Option<f64>) -> Travelled {
     let mut findings = Vec::new();
     for visit in visits {
-        let mut perturbed = Perturbed::new(law, &visit.step, road);
-        findings.push(check(&visit.name, &visit.response.tangent, &mut perturbed));
+        let finding = checked(law, road, visit, stiffness.unwrap_or(0.0));
+        let measured = finding.measured.greatest();
+        *stiffness = stiffness.or(Some(measured).filter(|_| finding.error <= SIDES));
+        findings.push(finding);
     }
     Causes { law, road, visits }.name(&mut findings);
     Travelled { road, findings }
+}
+
+/// The check by differences. It also looks along the step for jumps of a loose local iteration.
+fn checked(law: &mut dyn Law, road: Road, visit: &Visit, stiffness: f64) -> Finding {
+    let Visit { name, step, response, .. } = visit;
+    let mut perturbed = Perturbed::new(law, step, road);
+    let value = match perturbed.value(0, 0.0) {
+        Ok(value) => value,
+        Err(failed) => return not_checked(name, failed),
+    };
+    let size = perturbed.size();
+    let shared = RefCell::new(perturbed);
+    let loading = Loading { size, respond: &mut |part| shared.borrow_mut().part(part), stiffness };
+    check_along(name, &response.tangent, &value, &mut |k, h| shared.borrow_mut().value(k, h), Some(loading))
 }
 
 /// Adds what explains wrong tangents, and the mistakes that the states cannot show.

@@ -1,8 +1,9 @@
 //! The observations of a diagnosis: the measured tangent of each state, and for some wrong states the tangents elsewhere, such as the elastic one.
 
-use super::{History, Perturbed, Road, Visit, probe};
+use super::{History, Perturbed, Road, Visit, probe, with_gradient};
 use crate::convention::{Configuration, cauchy_stress};
 use crate::diagnosis::{Elsewhere, Measured, Observation};
+use crate::difference::{Estimate, Tableau};
 use crate::finding::{Finding, Verdict};
 use crate::law::{Law, Step};
 use crate::matrix::Matrix;
@@ -25,6 +26,7 @@ pub(super) fn observations(law: &mut dyn Law, visits: &[Visit], road: Road, find
     let chosen: Vec<usize> = wrong.iter().step_by(wrong.len().div_ceil(DIAGNOSED).max(1)).copied().collect();
     let flowing = if chosen.is_empty() { Vec::new() } else { flow_variables(law) };
     let rest = if chosen.is_empty() { None } else { at_rest(law, road, &flowing) };
+    let heat = chosen.last().and_then(|index| thermal(law, &visits[*index], road, &findings[*index].claimed, &flowing));
     let mut observations = Vec::new();
     for (index, (visit, finding)) in visits.iter().zip(findings).enumerate() {
         let judged = matches!(finding.verdict, Verdict::Wrong | Verdict::Consistent | Verdict::Inexact)
@@ -41,6 +43,8 @@ pub(super) fn observations(law: &mut dyn Law, visits: &[Visit], road: Road, find
         }
         elsewhere.extend(rest.clone().map(|rest| (Elsewhere::AtRest, rest)));
         if chosen.contains(&index) {
+            let heated = heat.and_then(|strain| heated(law, visit, road, strain, &flowing));
+            elsewhere.extend(heated.map(|heated| (Elsewhere::Heated, heated)));
             let history = History::after(&visit.step, &visit.response);
             let start = History::before(&visit.step);
             let sides = both_sides(law, &start, visit.step.length, road, &flowing);
@@ -54,6 +58,7 @@ pub(super) fn observations(law: &mut dyn Law, visits: &[Visit], road: Road, find
         observations.push(Observation {
             name: visit.name.clone(),
             at,
+            rotation: visit.step.rotation,
             claimed,
             measured: measured(finding),
             elsewhere,
@@ -69,8 +74,8 @@ fn smooth(law: &mut dyn Law, step: &Step, road: Road, finding: &Finding) -> bool
     let mut perturbed = Perturbed::new(law, step, road);
     (0..measured.columns).all(|column| {
         [1.0, -1.0].into_iter().all(|sign| {
-            let side = one_sided(measured.rows, sign, &mut |h| perturbed.value(column, h).ok());
-            side.is_some_and(|(derivative, error)| {
+            let side = one_sided(sign, &mut |h| perturbed.value(column, h).ok());
+            side.is_some_and(|Estimate { value: derivative, error }| {
                 (0..measured.rows).all(|row| {
                     let tolerance = SIDES * measured.greatest() + 10.0 * (errors[(row, column)] + error[row]);
                     (derivative[row] - measured[(row, column)]).abs() <= tolerance
@@ -84,6 +89,35 @@ fn smooth(law: &mut dyn Law, step: &Step, road: Road, finding: &Finding) -> bool
 fn at_rest(law: &mut dyn Law, road: Road, flowing: &[usize]) -> Option<Measured> {
     let history = History::at_rest(law);
     both_sides(law, &history, 1.0, road, flowing).map(|[elastic, _]| elastic)
+}
+
+/// The tangent in the state of a visit with a thermal strain s I.
+fn heated(law: &mut dyn Law, visit: &Visit, road: Road, s: f64, flowing: &[usize]) -> Option<Measured> {
+    let step = with_gradient(&visit.step, &scaled(s.exp(), &visit.step.gradient))?;
+    let history = History::after(&step, &law.respond(&step).ok()?);
+    both_sides(law, &history, step.length, road, flowing).map(|[elastic, _]| elastic)
+}
+
+/// The thermal strain s I with which a tangent is the claimed one, by Newton's method; `None` if there is none.
+fn thermal(law: &mut dyn Law, visit: &Visit, road: Road, claimed: &Matrix, flowing: &[usize]) -> Option<f64> {
+    const PROBE: f64 = 1e-4;
+    let (mut s, mut before) = (0.0, f64::INFINITY);
+    for _ in 0..6 {
+        let [at, next] = [s, s + PROBE].map(|s| heated(law, visit, road, s, flowing));
+        let (Measured { tangent: at, errors }, next) = (at?, next?.tangent);
+        let rest = at.mapped(|i, j| claimed[(i, j)] - at[(i, j)]);
+        if rest.greatest() <= errors.greatest() {
+            break;
+        }
+        if rest.greatest() > 0.5 * before {
+            return None;
+        }
+        before = rest.greatest();
+        let slopes = next.entries.iter().zip(&at.entries).map(|(next, at)| (next - at) / PROBE);
+        let [product, square] = slopes.zip(&rest.entries).fold([0.0; 2], |[p, q], (a, b)| [p + a * b, q + a * a]);
+        s += product / square;
+    }
+    (s.is_finite() && s != 0.0).then_some(s)
 }
 
 /// The internal variables that change by flow alone: a small general strain from rest leaves them as they are.
@@ -119,11 +153,11 @@ fn both_sides(
         let elastic = if forward { -1.0 } else { 1.0 };
         for (side, sign) in sides.iter_mut().zip([elastic, -elastic]) {
             let mut perturbed = Perturbed::new(law, &step, road);
-            let (derivative, errors) = one_sided(rows, sign, &mut |h| perturbed.value(column, h).ok())?;
+            let Estimate { value, error } = one_sided(sign, &mut |h| perturbed.value(column, h).ok())?;
             let unknown = forward && backward && sign == elastic;
             for row in 0..rows {
-                side.tangent[(row, column)] = derivative[row];
-                side.errors[(row, column)] = if unknown { f64::INFINITY } else { errors[row] };
+                side.tangent[(row, column)] = value[row];
+                side.errors[(row, column)] = if unknown { f64::INFINITY } else { error[row] };
             }
         }
     }
@@ -137,35 +171,17 @@ fn changes(law: &mut dyn Law, step: &Step, road: Road, (column, h): (usize, f64)
     (state.len() == step.state.len()).then(|| state.iter().zip(&step.state).map(|(new, old)| new != old).collect())
 }
 
-/// The one-sided derivative of a vector function at 0, by Richardson's extrapolation of (f(h) − f(0))/h with h halved
-/// (Ridders, 1982), and the error of each component.
-fn one_sided(rows: usize, sign: f64, f: &mut dyn FnMut(f64) -> Option<Vec<f64>>) -> Option<(Vec<f64>, Vec<f64>)> {
-    const LEVELS: usize = 7;
-    const ORDERS: usize = 6;
+/// The one-sided derivative of a vector function at 0, from h to h/64, and the error of each component.
+fn one_sided(sign: f64, f: &mut dyn FnMut(f64) -> Option<Vec<f64>>) -> Option<Estimate> {
+    const LEVELS: i32 = 7;
     let origin = f(0.0)?;
-    let mut best = (vec![f64::NAN; rows], vec![f64::INFINITY; rows]);
-    let mut above: Vec<Vec<f64>> = Vec::new();
+    let mut tableau = Tableau::new(2.0, LEVELS as usize, origin.len());
     for level in 0..LEVELS {
-        let h = sign * GREATEST * 0.5_f64.powi(level as i32);
-        let value = f(h)?;
-        let mut line = vec![(0..rows).map(|row| (value[row] - origin[row]) / h).collect::<Vec<f64>>()];
+        let h = GREATEST * 0.5_f64.powi(level);
+        let quotient: Vec<f64> = f(sign * h)?.iter().zip(&origin).map(|(a, b)| (a - b) / (sign * h)).collect();
         // Rounding of F moves the stress by ε times the tangent.
-        let size = origin.iter().chain(&line[0]).fold(0.0_f64, |size, entry| size.max(entry.abs()));
-        for order in 1..=level.min(ORDERS) {
-            let factor = 2.0_f64.powi(order as i32);
-            let extrapolated = |row: usize| (factor * line[order - 1][row] - above[order - 1][row]) / (factor - 1.0);
-            let next: Vec<f64> = (0..rows).map(extrapolated).collect();
-            for row in 0..rows {
-                let change = (next[row] - line[order - 1][row]).abs().max((next[row] - above[order - 1][row]).abs());
-                let noise = 4.0 * f64::EPSILON * size / h.abs();
-                if change.max(noise) < best.1[row] {
-                    best.0[row] = next[row];
-                    best.1[row] = change.max(noise);
-                }
-            }
-            line.push(next);
-        }
-        above = line;
+        let size = origin.iter().chain(&quotient).fold(0.0_f64, |size, entry| size.max(entry.abs()));
+        tableau.add(h, quotient, &vec![4.0 * f64::EPSILON * size / h; origin.len()]);
     }
-    Some(best)
+    Some(tableau.best)
 }

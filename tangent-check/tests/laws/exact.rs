@@ -82,15 +82,12 @@ pub fn exact(
     before: &Tensor,
     old: (&Tensor, &[f64]),
 ) -> Matrix {
-    let mut tangent = Matrix::zeros(convention.stress.count(), convention.strain.count());
-    for column in 0..tangent.columns {
-        let b = unit_strain(convention, column);
+    let column = |k: usize| {
+        let b = unit_strain(convention, k);
         let f = perturbed(convention.measure, f, before, &b);
         let (sigma, _) = law.respond(&inputs(f, before, old.0, old.1), Flow::Algorithmic);
-        let rate = slope(&rated(convention.measure, &f, &sigma, &b));
-        for (row, value) in convention.stress.vector(&rate).into_iter().enumerate() {
-            tangent[(row, column)] = value;
-        }
-    }
-    tangent
+        convention.stress.vector(&slope(&rated(convention.measure, &f, &sigma, &b)))
+    };
+    let columns: Vec<Vec<f64>> = (0..convention.strain.count()).map(column).collect();
+    Matrix::from_columns(convention.stress.count(), &columns)
 }

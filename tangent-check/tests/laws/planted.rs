@@ -66,8 +66,9 @@ pub enum Mistake {
         shear: bool,
     },
     WholeNumbers,
-    /// Q ℂ Qᵀ with Q = R, or Rᵀ.
+    /// Q ℂ Qᵀ with Q = R or ΔR, or transposed.
     Turned {
+        increment: bool,
         back: bool,
     },
     /// The term from one rate to another is too much.
@@ -101,11 +102,13 @@ impl Place {
     }
 }
 
-fn constants(step: &Step, convention: &Convention) -> (Tensor, Vec<f64>) {
+/// The stress and the internal variables at the start of a step.
+pub fn constants(step: &Step, convention: &Convention) -> (Tensor, Vec<f64>) {
     (cauchy_stress(convention, &step.stress, &step.gradient_before).unwrap(), step.state.clone())
 }
 
-fn plain(step: &Step, stress: &Tensor, state: &[f64]) -> Inputs {
+/// The inputs of a step without derivatives.
+pub fn plain(step: &Step, stress: &Tensor, state: &[f64]) -> Inputs {
     Inputs {
         gradient: constant(&step.gradient),
         gradient_before: constant(&step.gradient_before),
@@ -125,9 +128,8 @@ pub fn right(formula: &dyn Formula, step: &Step, convention: &Convention, flow: 
     if !(formula.incremental() && alone.contains(&convention.measure)) {
         return exact_at(formula, step, convention, (&stress, state), flow);
     }
-    let mut tangent = Matrix::zeros(convention.stress.count(), convention.strain.count());
-    for column in 0..tangent.columns {
-        let b = unit_strain(convention, column);
+    let column = |k: usize| {
+        let b = unit_strain(convention, k);
         let mut given = plain(step, &stress, state);
         given.strain_increment = dual(&step.strain_increment, &b);
         let (sigma, _) = formula.respond(&given, flow);
@@ -135,11 +137,10 @@ pub fn right(formula: &dyn Formula, step: &Step, convention: &Convention, flow: 
         if convention.measure == Measure::JaumannKirchhoff {
             rate = tensor::sum(&rate, tensor::trace(&b), &value(&sigma));
         }
-        for (row, entry) in convention.stress.vector(&rate).into_iter().enumerate() {
-            tangent[(row, column)] = entry;
-        }
-    }
-    tangent
+        convention.stress.vector(&rate)
+    };
+    let columns: Vec<Vec<f64>> = (0..convention.strain.count()).map(column).collect();
+    Matrix::from_columns(convention.stress.count(), &columns)
 }
 
 fn exact_at(formula: &dyn Formula, step: &Step, convention: &Convention, old: (&Tensor, &[f64]), flow: Flow) -> Matrix {
@@ -156,16 +157,6 @@ fn exact_at(formula: &dyn Formula, step: &Step, convention: &Convention, old: (&
     exact(&Timed(formula, step.length, flow), convention, &step.gradient, &step.gradient_before, old)
 }
 
-fn mapped(like: &Matrix, entry: impl Fn(usize, usize) -> f64) -> Matrix {
-    let mut matrix = like.clone();
-    for row in 0..like.rows {
-        for column in 0..like.columns {
-            matrix[(row, column)] = entry(row, column);
-        }
-    }
-    matrix
-}
-
 /// The tangent of another rate; of a law of strain increments by loops, from that of the Jaumann rate of Kirchhoff's stress.
 fn other_rate(formula: &dyn Formula, step: &Step, convention: &Convention, rate: Measure, sigma: &Tensor) -> Matrix {
     let other = Convention { measure: rate, ..convention.clone() };
@@ -179,7 +170,7 @@ fn other_rate(formula: &dyn Formula, step: &Step, convention: &Convention, rate:
         Flow::Algorithmic,
     );
     let s = sigma;
-    mapped(&own, |row, column| {
+    own.mapped(|row, column| {
         let (i, j) = convention.stress.pairs[row];
         let (k, l) = convention.strain.pairs[column];
         let d = |a: usize, b: usize| f64::from(u8::from(a == b));
@@ -218,47 +209,48 @@ impl Planted<'_> {
         match self.mistake {
             Mistake::None | Mistake::StepBefore => own,
             Mistake::Order { order, rows, columns } => {
-                mapped(&own, |i, j| c(if rows { order[i] } else { i }, if columns { order[j] } else { j }))
+                own.mapped(|i, j| c(if rows { order[i] } else { i }, if columns { order[j] } else { j }))
             }
             Mistake::Indices { rows: r, columns: k } => {
-                mapped(&own, |i, j| c(if r { swapped(rows, i) } else { i }, if k { swapped(columns, j) } else { j }))
+                own.mapped(|i, j| c(if r { swapped(rows, i) } else { i }, if k { swapped(columns, j) } else { j }))
             }
-            Mistake::Factors { rows: r, columns: k } => mapped(&own, |i, j| {
+            Mistake::Factors { rows: r, columns: k } => own.mapped(|i, j| {
                 c(i, j) * if shear(rows, i) { r } else { 1.0 } * if shear(columns, j) { k } else { 1.0 }
             }),
             Mistake::Block(x) => {
-                mapped(&own, |i, j| if shear(rows, i) && shear(columns, j) { x * c(i, j) } else { c(i, j) })
+                own.mapped(|i, j| if shear(rows, i) && shear(columns, j) { x * c(i, j) } else { c(i, j) })
             }
-            Mistake::Transposed => mapped(&own, |i, j| c(j, i)),
-            Mistake::Symmetrised => mapped(&own, |i, j| 0.5 * (c(i, j) + c(j, i))),
+            Mistake::Transposed => own.mapped(|i, j| c(j, i)),
+            Mistake::Symmetrised => own.mapped(|i, j| 0.5 * (c(i, j) + c(j, i))),
             Mistake::Rate(rate) => other_rate(self.formula, step, convention, rate, sigma),
-            Mistake::JacobianPower(n) => mapped(&own, |i, j| jacobian.powi(n) * c(i, j)),
+            Mistake::JacobianPower(n) => own.mapped(|i, j| jacobian.powi(n) * c(i, j)),
             Mistake::Elastic => right(self.formula, step, convention, Flow::Frozen),
             Mistake::Continuum => self.continuum(step, sigma),
             Mistake::AtRest => right(self.formula, &self.rest(), convention, Flow::Frozen),
-            Mistake::Sign => mapped(&own, |i, j| -c(i, j)),
-            Mistake::Times(x) => mapped(&own, |i, j| x * c(i, j)),
+            Mistake::Sign => own.mapped(|i, j| -c(i, j)),
+            Mistake::Times(x) => own.mapped(|i, j| x * c(i, j)),
             Mistake::Dyad { coefficient, stress_left, stress_right } => {
                 let left = |(i, j): (usize, usize)| if stress_left { sigma[i][j] } else { f64::from(u8::from(i == j)) };
                 let right =
                     |(i, j): (usize, usize)| if stress_right { sigma[i][j] } else { f64::from(u8::from(i == j)) };
-                mapped(&own, |i, j| c(i, j) + coefficient * left(rows[i]) * right(columns[j]))
+                own.mapped(|i, j| c(i, j) + coefficient * left(rows[i]) * right(columns[j]))
             }
             Mistake::NoGeometric => {
                 let f = tensor::inverse(&step.gradient).unwrap();
                 let s = tensor::scaled(jacobian, &tensor::product3(&f, sigma, &tensor::transposed(&f)));
                 // ∂(F S)_iJ/∂F_kL without ∂S: δ_ik S_LJ.
-                mapped(
-                    &own,
-                    |i, j| if rows[i].0 == columns[j].0 { c(i, j) - s[columns[j].1][rows[i].1] } else { c(i, j) },
+                own.mapped(
+                    |i, j| {
+                        if rows[i].0 == columns[j].0 { c(i, j) - s[columns[j].1][rows[i].1] } else { c(i, j) }
+                    },
                 )
             }
-            Mistake::DiagonalOnly => mapped(&own, |i, j| if i == j { c(i, j) } else { 0.0 }),
-            Mistake::StateFactor => mapped(&own, |i, j| jacobian.powf(0.3) * c(i, j)),
+            Mistake::DiagonalOnly => own.mapped(|i, j| if i == j { c(i, j) } else { 0.0 }),
+            Mistake::StateFactor => own.mapped(|i, j| jacobian.powf(0.3) * c(i, j)),
             Mistake::FingerTerm => {
                 let b = tensor::product(&step.gradient, &tensor::transposed(&step.gradient));
                 let at = |(i, j): (usize, usize)| b[i][j];
-                mapped(&own, |i, j| c(i, j) + 0.2 * at(rows[i]) * at(columns[j]))
+                own.mapped(|i, j| c(i, j) + 0.2 * at(rows[i]) * at(columns[j]))
             }
             _ => self.wrong_in_part(step, sigma, &own),
         }
@@ -270,18 +262,19 @@ impl Planted<'_> {
         let c = |row: usize, column: usize| own[(row, column)];
         let shear = |k: usize| convention.stress.pairs[k].0 != convention.stress.pairs[k].1;
         match self.mistake {
-            Mistake::Scaled(place, factor) => {
-                mapped(own, |i, j| c(i, j) * if place.holds(i, j) { factor } else { 1.0 })
-            }
-            Mistake::Copied => mapped(own, |i, j| c(i.min(j), i.max(j))),
+            Mistake::Scaled(place, factor) => own.mapped(|i, j| c(i, j) * if place.holds(i, j) { factor } else { 1.0 }),
+            Mistake::Copied => own.mapped(|i, j| c(i.min(j), i.max(j))),
             Mistake::BlockTransposed { shear: kind } => {
-                mapped(own, |i, j| if shear(i) == kind && shear(j) == kind { c(j, i) } else { c(i, j) })
+                own.mapped(|i, j| if shear(i) == kind && shear(j) == kind { c(j, i) } else { c(i, j) })
             }
-            Mistake::WholeNumbers => mapped(own, |i, j| c(i, j).trunc()),
-            Mistake::Turned { back } => self.turned(step, own, back),
+            Mistake::WholeNumbers => own.mapped(|i, j| c(i, j).trunc()),
+            Mistake::Turned { increment, back } => {
+                let rotation = if increment { step.rotation } else { tensor::polar(&step.gradient).unwrap().0 };
+                self.turned(own, &if back { tensor::transposed(&rotation) } else { rotation })
+            }
             Mistake::RateTerm(from, to) => {
                 let [from, to] = [from, to].map(|rate| other_rate(self.formula, step, convention, rate, sigma));
-                mapped(own, |i, j| c(i, j) + to[(i, j)] - from[(i, j)])
+                own.mapped(|i, j| c(i, j) + to[(i, j)] - from[(i, j)])
             }
             Mistake::StartOfStep => {
                 let start = Step {
@@ -300,14 +293,12 @@ impl Planted<'_> {
 
 impl Planted<'_> {
     /// Q ℂ Qᵀ by four loops over indices.
-    fn turned(&self, step: &Step, own: &Matrix, back: bool) -> Matrix {
-        let (rotation, _) = tensor::polar(&step.gradient).unwrap();
-        let q = if back { tensor::transposed(&rotation) } else { rotation };
+    fn turned(&self, own: &Matrix, q: &Tensor) -> Matrix {
         let place = |i: usize, j: usize| {
             let pairs = &self.convention.stress.pairs;
             pairs.iter().position(|pair| *pair == (i, j) || *pair == (j, i)).unwrap()
         };
-        mapped(own, |row, column| {
+        own.mapped(|row, column| {
             let [(i, j), (k, l)] = [self.convention.stress.pairs[row], self.convention.strain.pairs[column]];
             let quadruples = (0..81).map(|n| (n / 27, n / 9 % 3, n / 3 % 3, n % 3));
             quadruples.map(|(a, b, c, d)| q[i][a] * q[j][b] * q[k][c] * q[l][d] * own[(place(a, b), place(c, d))]).sum()

@@ -2,10 +2,10 @@
 
 use super::dual::*;
 use super::exact::unit_strain;
-use super::planted::right;
+use super::planted::{constants, plain, right};
 use super::shipped::{Flow, Formula, Inputs, number, pack, unpack};
 use std::cell::Cell;
-use tangent_check::convention::{Convention, Measure, Tensor, cauchy_stress, stress_vector};
+use tangent_check::convention::{Convention, Measure, Tensor, stress_vector};
 use tangent_check::law::{CallFailed, Law, Response, Step};
 use tangent_check::matrix::Matrix;
 use tangent_check::roads::with_gradient;
@@ -55,6 +55,9 @@ pub struct J2 {
 /// A steel without hardening, in MPa.
 pub const STEEL: J2 =
     J2 { name: "", strength: 250.0, linear: 0.0, voce: 0.0, kinematic: 0.0, viscosity: 0.0, exponent: 1.0 };
+
+/// A steel whose hardening saturates.
+pub const VOCE: J2 = J2 { name: "J2, Voce", linear: 130.0, voce: 265.0, ..STEEL };
 
 impl Formula for J2 {
     fn name(&self) -> &'static str {
@@ -290,7 +293,7 @@ pub fn laws() -> Vec<Box<dyn Formula>> {
     vec![
         Box::new(J2 { name: "J2, perfect", ..STEEL }),
         Box::new(J2 { name: "J2, linear hardening", linear: 2000.0, ..STEEL }),
-        Box::new(J2 { name: "J2, Voce", linear: 130.0, voce: 265.0, ..STEEL }),
+        Box::new(VOCE),
         Box::new(J2 { name: "J2, kinematic", linear: 500.0, kinematic: 5000.0, ..STEEL }),
         Box::new(J2 { name: "viscoplastic", linear: 500.0, viscosity: 400.0, exponent: 0.5, ..STEEL }),
         Box::new(J2Finite),
@@ -323,23 +326,11 @@ pub struct Right<'a> {
 }
 
 impl Right<'_> {
-    fn inputs(&self, step: &Step) -> Inputs {
-        let stress = cauchy_stress(&self.convention(), &step.stress, &step.gradient_before).unwrap();
-        Inputs {
-            gradient: constant(&step.gradient),
-            gradient_before: constant(&step.gradient_before),
-            strain_increment: constant(&step.strain_increment),
-            rotation: constant(&step.rotation),
-            length: step.length,
-            stress: constant(&stress),
-            state: step.state.clone(),
-        }
-    }
-
     /// Stress, as a tensor, and state.
     fn answer(&self, step: &Step) -> (Tensor, Vec<f64>) {
         TOLERANCE.set(if let Written::Loose(tolerance) = self.written { tolerance } else { 0.0 });
-        let (sigma, state) = self.formula.respond(&self.inputs(step), Flow::Algorithmic);
+        let (stress, state) = constants(step, &self.convention());
+        let (sigma, state) = self.formula.respond(&plain(step, &stress, &state), Flow::Algorithmic);
         TOLERANCE.set(0.0);
         (value(&sigma), state)
     }
@@ -347,10 +338,9 @@ impl Right<'_> {
     /// (σ(Δε + h B) − σ)/h, or (τ(F + h B F) − τ)/(J h).
     fn forward(&self, step: &Step, h: f64) -> Matrix {
         let convention = self.convention();
-        let mut tangent = Matrix::zeros(6, 6);
         let at = |step: &Step| self.answer(step).0;
-        for column in 0..6 {
-            let b = unit_strain(&convention, column);
+        let column = |k: usize| {
+            let b = unit_strain(&convention, k);
             let [value, perturbed] = if self.formula.incremental() {
                 let grown = Step { strain_increment: tensor::sum(&step.strain_increment, h, &b), ..step.clone() };
                 [at(step), at(&grown)]
@@ -359,12 +349,9 @@ impl Right<'_> {
                 let ratio = tensor::determinant(&gradient) / tensor::determinant(&step.gradient);
                 [at(step), tensor::scaled(ratio, &at(&with_gradient(step, &gradient).unwrap()))]
             };
-            let rate = tensor::scaled(1.0 / h, &tensor::sum(&perturbed, -1.0, &value));
-            for (row, entry) in convention.stress.vector(&rate).into_iter().enumerate() {
-                tangent[(row, column)] = entry;
-            }
-        }
-        tangent
+            convention.stress.vector(&tensor::scaled(1.0 / h, &tensor::sum(&perturbed, -1.0, &value)))
+        };
+        Matrix::from_columns(6, &(0..6).map(column).collect::<Vec<_>>())
     }
 }
 

@@ -1,4 +1,4 @@
-//! Six laws, each a function of the inputs of a step.
+//! Laws, each a function of the inputs of a step.
 
 use super::dual::*;
 use tangent_check::convention::{Components, Tensor};
@@ -126,7 +126,27 @@ fn radial_return(trial: Dual, shear: f64, alpha: f64) -> Dual {
 const SHEAR: f64 = 80.0;
 const BULK: f64 = 160.0;
 
-/// J2 plasticity with the logarithmic elastic strain of b_e = F C_p⁻¹ Fᵀ.
+/// The logarithmic elastic strain of b_e = F C_p⁻¹ Fᵀ without flow.
+fn trial(inputs: &Inputs) -> D3 {
+    let f = &inputs.gradient;
+    times(number(0.5), &log(&mul(&mul(f, &unpack(&inputs.state[..6])), &t(f))))
+}
+
+/// The internal variables after flow: C_p⁻¹ of an elastic strain, and the variable of hardening.
+fn flowed(inputs: &Inputs, elastic: &D3, hardening: f64) -> Vec<f64> {
+    let inverse = inv(&inputs.gradient);
+    let cp = mul(&mul(&inverse, &exp(&times(number(2.0), elastic))), &t(&inverse));
+    [pack(&value(&cp)), vec![hardening]].concat()
+}
+
+/// The stress from internal variables that rest, inside the yield surface by far.
+fn resting(law: &dyn Formula, inputs: &Inputs, state: &[f64], inside: f64) -> D3 {
+    let mut state = state.to_vec();
+    state[6] += inside;
+    law.respond(&Inputs { state, ..*inputs }, Flow::Algorithmic).0
+}
+
+/// J2 plasticity with the logarithmic elastic strain.
 pub struct J2Finite;
 
 impl Formula for J2Finite {
@@ -139,8 +159,7 @@ impl Formula for J2Finite {
     fn respond(&self, inputs: &Inputs, flow: Flow) -> (D3, Vec<f64>) {
         let f = &inputs.gradient;
         let alpha = inputs.state[6];
-        let be = mul(&mul(f, &unpack(&inputs.state[..6])), &t(f));
-        let strain = times(number(0.5), &log(&be));
+        let strain = trial(inputs);
         let s = times(number(2.0 * SHEAR), &dev(&strain));
         let volume = times(tr(&strain) * BULK, &unit());
         let [norm, root] = [size(&s), number((2.0_f64 / 3.0).sqrt())];
@@ -151,53 +170,11 @@ impl Formula for J2Finite {
         let gamma = radial_return(norm, SHEAR, alpha);
         let returned = times(number(1.0) - gamma * (2.0 * SHEAR) / norm, &s);
         let elastic = add(&times(number(0.5 / SHEAR), &returned), &times(tr(&strain) * (1.0 / 3.0), &unit()));
-        let inverse = inv(f);
-        let cp = mul(&mul(&inverse, &exp(&times(number(2.0), &elastic))), &t(&inverse));
-        let mut state = pack(&value(&cp));
-        state.push(alpha + (gamma * root).0);
+        let state = flowed(inputs, &elastic, alpha + (gamma * root).0);
         if flow == Flow::Frozen {
-            let mut frozen = Inputs { state: state.clone(), ..copy(inputs) };
-            // Inside the yield surface by far, so that no flow follows.
-            frozen.state[6] += 1.0;
-            return (self.respond(&frozen, Flow::Algorithmic).0, state);
+            return (resting(self, inputs, &state, 1.0), state);
         }
         (times(number(1.0) / det(f), &add(&returned, &volume)), state)
-    }
-}
-
-fn copy(inputs: &Inputs) -> Inputs {
-    Inputs { state: inputs.state.clone(), ..*inputs }
-}
-
-/// J2 plasticity of the strain increment: σ = ΔR σ₀ ΔRᵀ + C:Δε, returned.
-pub struct J2Incremental;
-
-impl Formula for J2Incremental {
-    fn name(&self) -> &'static str {
-        "J2, strain increments"
-    }
-    fn state_at_rest(&self) -> Vec<f64> {
-        vec![0.0]
-    }
-    fn incremental(&self) -> bool {
-        true
-    }
-    fn respond(&self, inputs: &Inputs, flow: Flow) -> (D3, Vec<f64>) {
-        let turned = mul(&mul(&inputs.rotation, &inputs.stress), &t(&inputs.rotation));
-        let increment = &inputs.strain_increment;
-        let trial = add(&turned, &times(number(2.0 * SHEAR), &dev(increment)));
-        let trial = add(&trial, &times(tr(increment) * BULK, &unit()));
-        let s = dev(&trial);
-        let norm = size(&s);
-        let root = (2.0_f64 / 3.0).sqrt();
-        if norm.0 <= (voce(number(inputs.state[0])).0 * root).0 {
-            return (trial, inputs.state.clone());
-        }
-        let gamma = radial_return(norm, SHEAR, inputs.state[0]);
-        let state = vec![inputs.state[0] + root * gamma.0];
-        let flow_strain = times(gamma * (2.0 * SHEAR) / norm, &s);
-        let flow_strain = if flow == Flow::Frozen { constant(&value(&flow_strain)) } else { flow_strain };
-        (sub(&trial, &flow_strain), state)
     }
 }
 
@@ -214,8 +191,7 @@ impl Formula for DruckerPrager {
     fn respond(&self, inputs: &Inputs, flow: Flow) -> (D3, Vec<f64>) {
         let [friction, dilatancy, cohesion, hardening] = [0.5, 0.15, 1.5, 2.0];
         let f = &inputs.gradient;
-        let be = mul(&mul(f, &unpack(&inputs.state[..6])), &t(f));
-        let strain = times(number(0.5), &log(&be));
+        let strain = trial(inputs);
         let s = times(number(2.0 * SHEAR), &dev(&strain));
         let pressure = tr(&strain) * BULK;
         let norm = size(&s);
@@ -234,14 +210,9 @@ impl Formula for DruckerPrager {
         let pressure = pressure - gamma * (3.0 * BULK * dilatancy);
         let returned = times(ratio, &s);
         let elastic = add(&times(number(0.5 / SHEAR), &returned), &times(pressure * (1.0 / (3.0 * BULK)), &unit()));
-        let inverse = inv(f);
-        let cp = mul(&mul(&inverse, &exp(&times(number(2.0), &elastic))), &t(&inverse));
-        let mut state = pack(&value(&cp));
-        state.push(inputs.state[6] + gamma.0);
+        let state = flowed(inputs, &elastic, inputs.state[6] + gamma.0);
         if flow == Flow::Frozen {
-            let mut frozen = Inputs { state: state.clone(), ..copy(inputs) };
-            frozen.state[6] += 10.0;
-            return (self.respond(&frozen, Flow::Algorithmic).0, state);
+            return (resting(self, inputs, &state, 10.0), state);
         }
         let tau = add(&returned, &times(pressure, &unit()));
         (times(number(1.0) / det(f), &tau), state)

@@ -1,9 +1,9 @@
-//! Vectors and matrices of tensors, in Abaqus' order 11, 22, 33, 12, 13, 23.
+//! The laws of stories, and vectors and matrices of tensors in Abaqus' order 11, 22, 33, 12, 13, 23.
 
-use tangent_check::convention::Tensor;
-use tangent_check::law::Step;
+use tangent_check::convention::{Components, Convention, Measure, Tensor};
+use tangent_check::law::{CallFailed, Law, Response, Step};
 use tangent_check::matrix::Matrix;
-use tangent_check::tensor::{IDENTITY, ZERO, determinant, inverse, product, transposed};
+use tangent_check::tensor::{IDENTITY, determinant, inverse, product, transposed};
 
 /// The index pairs in Abaqus' order.
 pub const ORDER: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
@@ -15,39 +15,52 @@ pub enum Version {
     After,
 }
 
-impl Version {
-    /// The name of a law in this version.
-    pub fn label(self, law: &str) -> String {
-        match self {
-            Self::Before => format!("{law}, before"),
-            Self::After => format!("{law}, after"),
-        }
+/// The law of a story.
+pub struct Story {
+    pub law: &'static str,
+    pub measure: Measure,
+    /// The internal variables at rest.
+    pub rest: fn() -> Vec<f64>,
+    pub respond: fn(Version, &Step) -> Response,
+}
+
+/// A law of a story before or after the repair.
+pub struct Told<'a>(pub &'a Story, pub Version);
+
+impl Law for Told<'_> {
+    fn name(&self) -> String {
+        format!("{}, {:?}", self.0.law, self.1)
+    }
+
+    fn convention(&self) -> Convention {
+        Convention::abaqus(self.0.measure)
+    }
+
+    fn state_at_rest(&self) -> Vec<f64> {
+        (self.0.rest)()
+    }
+
+    fn respond(&mut self, step: &Step) -> Result<Response, CallFailed> {
+        Ok((self.0.respond)(self.1, step))
     }
 }
 
 /// The components of a symmetric tensor.
 pub fn vector(tensor: &Tensor) -> Vec<f64> {
-    ORDER.iter().map(|&(i, j)| tensor[i][j]).collect()
+    Components::abaqus(1.0).vector(tensor)
 }
 
 /// The symmetric tensor of six components.
 pub fn symmetric_tensor(vector: &[f64]) -> Tensor {
-    let mut tensor = ZERO;
-    for (&(i, j), &entry) in ORDER.iter().zip(vector) {
-        (tensor[i][j], tensor[j][i]) = (entry, entry);
-    }
-    tensor
+    Components::abaqus(1.0).symmetric_tensor(vector)
 }
 
 /// The 6×6 matrix of a fourth-order tensor with both minor symmetries. Its columns belong to engineering strains.
 pub fn matrix(fourth: impl Fn(usize, usize, usize, usize) -> f64) -> Matrix {
-    let mut matrix = Matrix::zeros(6, 6);
-    for (row, &(i, j)) in ORDER.iter().enumerate() {
-        for (column, &(k, l)) in ORDER.iter().enumerate() {
-            matrix[(row, column)] = fourth(i, j, k, l);
-        }
-    }
-    matrix
+    Matrix::from_entries(6, 6, |row, column| {
+        let ((i, j), (k, l)) = (ORDER[row], ORDER[column]);
+        fourth(i, j, k, l)
+    })
 }
 
 /// δᵢⱼ.
@@ -82,21 +95,5 @@ impl RightCauchyGreen {
 
     pub fn from_c(c: Tensor) -> Self {
         Self { c, inverse: inverse(&c).unwrap_or([[f64::NAN; 3]; 3]), jacobian: determinant(&c).sqrt() }
-    }
-}
-
-/// A step of length 1 from rest to F, with the strain increment `strain`.
-pub fn step(gradient: Tensor, strain: Tensor, state: Vec<f64>) -> Step {
-    Step {
-        time: 0.0,
-        length: 1.0,
-        number: 1,
-        gradient_before: IDENTITY,
-        gradient,
-        strain: ZERO,
-        strain_increment: strain,
-        rotation: IDENTITY,
-        stress: vec![0.0; 6],
-        state,
     }
 }

@@ -1,9 +1,5 @@
 //! panels, pull request 8 (17 September 2026): the shear of a bent plate, twice.
 //!
-//! Source: <https://github.com/saullocastro/panels/pull/8>, "computed the nonlinear shear strain as `2·w,x·w,y` instead of `w,x·w,y`" and
-//! "Newton-Raphson converged only linearly". The doubled product stood in the strains of `calc_fint` and `fkG_num` from the first version
-//! of 16 June 2018 on. The virtual strains were right. Hence the internal force had no energy, and the tangent was not its derivative.
-//!
 //! Our residual: one point of von Kármán's plate. The unknowns are the linear membrane strains e_x, e_y, g and the slopes w,x and w,y:
 //!
 //! ε = (e_x + ½ w,x², e_y + ½ w,y², g + w,x w,y), n = 𝔸 ε, f = Bᵀ n, B = ∂ε/∂u,
@@ -13,7 +9,6 @@
 
 use crate::algebra::Version;
 use crate::check::{all, assert_consistent, assert_wrong, vector_finding};
-use crate::witness;
 use tangent_check::matrix::Matrix;
 
 /// 𝔸 of an unbalanced laminate.
@@ -48,16 +43,8 @@ pub fn force(version: Version, u: Unknowns, component: usize, h: f64) -> Vec<f64
 /// K.
 pub fn tangent(version: Version, u: Unknowns) -> Matrix {
     let b = gradient(u);
-    let mut tangent = Matrix::zeros(5, 5);
-    for i in 0..5 {
-        for j in 0..5 {
-            for a in 0..3 {
-                for c in 0..3 {
-                    tangent[(i, j)] += b[a][i] * LAMINATE[a][c] * b[c][j];
-                }
-            }
-        }
-    }
+    let material = |i: usize, j: usize, a: usize| (0..3).map(|c| b[a][i] * LAMINATE[a][c] * b[c][j]).sum::<f64>();
+    let mut tangent = Matrix::from_entries(5, 5, |i, j| (0..3).map(|a| material(i, j, a)).sum());
     let [n_x, n_y, n_xy] = membrane_forces(version, u);
     for (row, column, n) in [(3, 3, n_x), (3, 4, n_xy), (4, 3, n_xy), (4, 4, n_y)] {
         tangent[(row, column)] += n;
@@ -65,7 +52,6 @@ pub fn tangent(version: Version, u: Unknowns) -> Matrix {
     tangent
 }
 
-#[cfg(test)]
 const STATE: Unknowns = [0.01, 0.02, -0.03, 0.2, 0.3];
 
 #[test]
@@ -81,6 +67,4 @@ fn before_the_columns_of_the_slopes_are_wrong() {
 fn after_the_tangent_is_the_derivative_of_the_force() {
     let claimed = tangent(Version::After, STATE);
     assert_consistent(&vector_finding(&claimed, &mut |k, h| force(Version::After, STATE, k, h)));
-    let measured = witness::columns(5, 5, &mut |k, h| force(Version::After, STATE, k, h));
-    assert!(witness::worst(&claimed, &measured).0 < 1e-7);
 }

@@ -1,15 +1,10 @@
 //! MaterialModels.jl, pull request 52 (15 June 2023): ∂S/∂E in place of ∂S/∂C.
 //!
-//! Source: <https://github.com/kimauth/MaterialModels.jl/pull/52>, "The finite strain elasticity routines returned `dSdE` instead of
-//! `dSdC`." The tangent was right (2 ∂²Ψ/∂C²) until 10 September 2021. Pull request 34 then replaced it by a closed form and added a test,
-//! which compared the tangent with 4 ∂²Ψ/∂C². Formula and test shared the mistake, and the factor 2 lived for 21 months.
-//!
 //! Our function: S(C) of a neo-Hookean solid. ∂S/∂C = ½ ∂S/∂E, as C = I + 2E. Before: ∂S/∂E.
 
 use crate::algebra::{ORDER, RightCauchyGreen, Version, matrix, vector};
 use crate::check::{all, assert_consistent, assert_wrong, vector_finding};
 use crate::neo_hooke;
-use crate::witness;
 use tangent_check::convention::Tensor;
 use tangent_check::matrix::Matrix;
 
@@ -30,7 +25,6 @@ pub fn tangent(version: Version, c: &Tensor) -> Matrix {
 }
 
 /// A general C.
-#[cfg(test)]
 const C: Tensor = [[1.5, 0.2, 0.1], [0.2, 1.1, -0.2], [0.1, -0.2, 0.8]];
 
 #[test]
@@ -44,6 +38,4 @@ fn before_the_tangent_is_twice_the_derivative() {
 fn after_the_tangent_is_the_derivative_by_c() {
     let claimed = tangent(Version::After, &C);
     assert_consistent(&vector_finding(&claimed, &mut |k, h| stress(&C, k, h)));
-    let measured = witness::columns(6, 6, &mut |k, h| stress(&C, k, h));
-    assert!(witness::worst(&claimed, &measured).0 < 1e-7);
 }

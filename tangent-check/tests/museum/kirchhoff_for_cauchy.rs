@@ -1,45 +1,28 @@
 //! fedoo, pull request 48 (9 July 2026): a Kirchhoff tangent is used as a Cauchy tangent.
 //!
-//! Source: <https://github.com/3MAH/fedoo/pull/48>, "convert the returned "box" tangent to the appropriate Ds/dE or spatial Cauchy rate
-//! (including J correction for the logarithmic rate)". We read the description, not the changed lines.
-//!
 //! Our law models the factor J alone: a neo-Hookean solid as a UMAT, whose DDSDDE is the Jaumann rate of the Kirchhoff stress over J,
 //!
 //! ℂ = c + ½ (δᵢₖ σⱼₗ + σᵢₖ δⱼₗ + δᵢₗ σⱼₖ + σᵢₗ δⱼₖ).
 //!
 //! Before: J ℂ, not divided by J. The factor is invisible where the volume is kept.
 
-use crate::algebra::{Version, matrix, rotation_term, vector};
-use crate::check::{GRADIENT, all, assert_diagnosed, assert_law_consistent, assert_law_wrong};
+use crate::algebra::{Story, Version, matrix, rotation_term, vector};
+use crate::check::{GRADIENT, all, assert_diagnosed, assert_law_wrong};
 use crate::neo_hooke;
-use tangent_check::convention::{Convention, Measure};
-use tangent_check::law::{CallFailed, Law, Response, Step};
+use tangent_check::convention::Measure;
+use tangent_check::law::{Response, Step};
 use tangent_check::tensor::determinant;
 
-pub struct Rubber(pub Version);
+pub const STORY: Story = Story { law: "Neo-Hookean UMAT", measure: Measure::JaumannKirchhoff, rest: Vec::new, respond };
 
-impl Law for Rubber {
-    fn name(&self) -> String {
-        self.0.label("Neo-Hookean UMAT")
-    }
-
-    fn convention(&self) -> Convention {
-        Convention::abaqus(Measure::JaumannKirchhoff)
-    }
-
-    fn state_at_rest(&self) -> Vec<f64> {
-        Vec::new()
-    }
-
-    fn respond(&mut self, step: &Step) -> Result<Response, CallFailed> {
-        let jacobian = determinant(&step.gradient);
-        let stress = neo_hooke::cauchy(&step.gradient, jacobian);
-        let factor = if self.0 == Version::Before { jacobian } else { 1.0 };
-        let tangent = matrix(|i, j, k, l| {
-            factor * (neo_hooke::spatial_modulus(jacobian, [i, j, k, l]) + rotation_term(&stress, [i, j, k, l]))
-        });
-        Ok(Response { stress: vector(&stress), tangent, state: Vec::new() })
-    }
+fn respond(version: Version, step: &Step) -> Response {
+    let jacobian = determinant(&step.gradient);
+    let stress = neo_hooke::cauchy(&step.gradient, jacobian);
+    let factor = if version == Version::Before { jacobian } else { 1.0 };
+    let tangent = matrix(|i, j, k, l| {
+        factor * (neo_hooke::spatial_modulus(jacobian, [i, j, k, l]) + rotation_term(&stress, [i, j, k, l]))
+    });
+    Response { stress: vector(&stress), tangent, state: Vec::new() }
 }
 
 #[test]
@@ -48,12 +31,7 @@ fn before_the_tangent_is_j_times_too_large() {
     let zero = [(0, 5), (1, 4), (2, 3)];
     let entries = all(6, 6).into_iter().filter(|&(row, column)| !zero.contains(&(row.min(column), row.max(column))));
     let entries = entries.collect();
-    let (report, finding) = assert_law_wrong(&mut Rubber(Version::Before), &[(0, 0)], &entries);
+    let (report, finding) = assert_law_wrong(&STORY, &[(0, 0)], &entries);
     assert!((finding.deviation - (determinant(&GRADIENT) - 1.0)).abs() < 1e-9, "{}", finding.deviation);
     assert_diagnosed(&report, "an additional factor J");
-}
-
-#[test]
-fn after_the_tangent_is_over_j() {
-    assert_law_consistent(&mut Rubber(Version::After));
 }

@@ -1,10 +1,5 @@
 //! ipc-toolkit, pull request 239 (7 June 2026): two mistakes in the shape derivative of nearly parallel edges.
 //!
-//! Source: <https://github.com/ipc-sim/ipc-toolkit/pull/239>, "used the wrong second factor" and "was missing one outer-product term"; the
-//! effect is told in <https://github.com/ipc-sim/ipc-toolkit/pull/238>: "~400× per-pair inflation and an ~10⁸× sign-flipped end-to-end
-//! gradient". The first line came on 30 October 2023 with pull request 76, itself a repair of this derivative. The tests of the shape
-//! derivative had no nearly parallel edges.
-//!
 //! Our residual: edges p = P + u_p and q = Q + u_q with the gap r = R + u_r. The displacements u are fixed, and the shape (P, Q, R) moves.
 //! The potential is m(s, ε) f(r): the mollifier m = (2 − s/ε) s/ε with s = |p × q|² and ε = ½ |P|² |Q|², and the barrier
 //! f = −(d − d̂)² ln(d/d̂) of d = |r|². The force is f ∇ᵤm + m ∇ᵤf. Its derivative by the shape is
@@ -15,7 +10,6 @@
 //! In ipc-toolkit, ε has the factor 10⁻³ and r depends on both edges; there the matrix is the transpose of ours.
 
 use crate::check::{all, assert_consistent, assert_wrong, vector_finding};
-use crate::witness;
 use tangent_check::matrix::Matrix;
 
 const THRESHOLD: f64 = 0.5;
@@ -156,9 +150,7 @@ pub fn tangent(repairs: Repairs, shape: &Shape, displacement: &Shape) -> Matrix 
     tangent
 }
 
-#[cfg(test)]
 const SHAPE: Shape = [1.0, 0.1, 0.0, 1.1, 0.2, 0.1, 0.2, 0.3, 1.1];
-#[cfg(test)]
 const DISPLACEMENT: Shape = [0.1, 0.05, -0.1, 0.0, 0.1, 0.2, 0.1, 0.0, 0.05];
 
 #[test]
@@ -176,6 +168,4 @@ fn before_the_rows_of_the_gap_are_wrong() {
 fn after_both_repairs_the_derivative_is_right() {
     let claimed = tangent(Repairs { factor: true, term: true }, &SHAPE, &DISPLACEMENT);
     assert_consistent(&vector_finding(&claimed, &mut |k, h| force(&SHAPE, &DISPLACEMENT, k, h)));
-    let measured = witness::columns(9, 9, &mut |k, h| force(&SHAPE, &DISPLACEMENT, k, h));
-    assert!(witness::worst(&claimed, &measured).0 < 1e-7);
 }

@@ -1,20 +1,12 @@
 //! OpenSees, issue 551 (4 March 2021): reinforcement at an oblique angle, wrong for nine years and through two repairs.
 //!
-//! Source: <https://github.com/OpenSees/OpenSees/issues/551>, "the line "tangent(1,2) = tangent(1,2) ;" is obviously wrong", and the
-//! history of `PlateRebarMaterial.cpp`. The components are 11, 22, 12:
-//!
-//! - 22 August 2013, first version: c³s and c²s² exchanged, as if the components were 11, 12, 22;
-//! - 22 September 2016: a repair that changed the first row and not the others;
-//! - 15 March 2021: the repair after the issue, which believed "that the getInitialTangent is the correct one" and copied it: the order
-//!   of 2013 again;
-//! - 10 October 2022: right, by the merge of pull request 359.
+//! The components are 11, 22, 12. The tangents of 2013 and 2021 have c³s and c²s² exchanged, that of 2016 in all rows but the first.
 //!
 //! Our function: a bar at angle θ with the stress σ(ε) = σ₀ tanh(E ε/σ₀), c = cos θ, s = sin θ:
 //!
 //! ε = ε₁₁ c² + ε₂₂ s² + γ₁₂ c s, σ₁₁ = σ c², σ₂₂ = σ s², σ₁₂ = σ c s, tangent = σ'(ε) v ⊗ v with v = (c², s², c s).
 
 use crate::check::{assert_consistent, assert_wrong, vector_finding};
-use crate::witness;
 use tangent_check::matrix::Matrix;
 
 const STIFFNESS: f64 = 2.0;
@@ -63,12 +55,9 @@ pub fn tangent(year: Year, angle: f64, strain: Strain) -> Matrix {
     Matrix { rows: 3, columns: 3, entries: entries.map(|entry| modulus * entry).to_vec() }
 }
 
-#[cfg(test)]
 const OBLIQUE: f64 = 0.5;
-#[cfg(test)]
 const STATE: Strain = [0.1, 0.2, -0.1];
 
-#[cfg(test)]
 fn check(year: Year, angle: f64) -> tangent_check::finding::Finding {
     vector_finding(&tangent(year, angle, STATE), &mut |k, h| stress(angle, STATE, k, h))
 }
@@ -103,6 +92,4 @@ fn at_45_degrees_the_order_does_not_show() {
 #[test]
 fn in_2022_the_tangent_is_right() {
     assert_consistent(&check(Year::Y2022, OBLIQUE));
-    let measured = witness::columns(3, 3, &mut |k, h| stress(OBLIQUE, STATE, k, h));
-    assert!(witness::worst(&tangent(Year::Y2022, OBLIQUE, STATE), &measured).0 < 1e-7);
 }

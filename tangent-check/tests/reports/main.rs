@@ -161,7 +161,7 @@ fn formats_by_name() {
     for format in Format::ALL {
         assert_eq!(Format::from_name(format.name()), Ok(format));
     }
-    let error = Format::from_name("x\nml").expect_err("no format has this name").to_string();
+    let error = Format::from_name("x\nml").expect_err("no format has this name");
     let names = "terminal, terminal-full, markdown, junit, github, sarif, json";
     assert_eq!(error, format!("There is no report format \"x\\nml\". Allowed are: {names}."));
 }

@@ -6,16 +6,14 @@ use std::collections::BTreeSet;
 use tangent_check::finding::{Diagnosis, Entry, Finding, Reason, Report, Verdict};
 use tangent_check::matrix::Matrix;
 use tangent_check::report::{Format, Options, write};
+use tangent_check::states;
 
-/// Numbers of the generator SplitMix64.
-struct Random(u64);
+/// Random parts of reports.
+struct Random(states::Random);
 
 impl Random {
     fn below(&mut self, bound: usize) -> usize {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mixed = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((mixed ^ (mixed >> 31)) % bound as u64) as usize
+        (self.0.between(0.0, bound as f64) as usize).min(bound - 1)
     }
 
     fn number(&mut self) -> f64 {
@@ -93,7 +91,7 @@ impl Random {
 
 /// Random reports with all combinations of options.
 fn random_reports() -> impl Iterator<Item = (Report, Options)> {
-    let mut random = Random(37);
+    let mut random = Random(states::Random::new(37));
     (0..400).map(move |_| {
         let options =
             Options { file: [Some(random.text()), None][random.below(2)].clone(), allow_inexact: random.below(2) == 0 };
@@ -258,7 +256,7 @@ fn json_names_every_number_that_is_not_finite() {
 
 #[test]
 fn entries_show_the_digits_in_which_they_differ() {
-    let mut random = Random(5);
+    let mut random = Random(states::Random::new(5));
     for _ in 0..2000 {
         let measured = (1.0 + random.below(1000) as f64 / 100.0) * 10_f64.powi(random.below(40) as i32 - 20);
         let claimed = measured * (1.0 + 10_f64.powi(-(random.below(14) as i32)));
