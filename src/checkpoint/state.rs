@@ -214,8 +214,8 @@ type Nodes<const D: usize> = (Nodal<D>, Vec<Vector<f64, D>>);
 /// a step knows it.
 ///
 /// # Errors
-/// The nodal fields differ in length.
-fn grid<const D: usize>(arrays: &Arrays) -> Result<Option<Nodes<D>>, String> {
+/// The nodal fields differ in length. Velocities and accelerations are absent with inertia, or there without it.
+fn grid<const D: usize>(arrays: &Arrays, has_inertia: bool) -> Result<Option<Nodes<D>>, String> {
     fn field<T: Element>(arrays: &Arrays, name: &str) -> Pooled<T> {
         Pool::default().collect(values(arrays, name))
     }
@@ -231,9 +231,13 @@ fn grid<const D: usize>(arrays: &Arrays) -> Result<Option<Nodes<D>>, String> {
     if nodes == 0 {
         return Ok(None);
     }
-    let optional = [&nodal.velocity, &nodal.acceleration, &nodal.out_of_balance];
-    let fits = rate.len() == nodes && optional.iter().all(|field| [0, nodes].contains(&field.len()));
-    if fits { Ok(Some((nodal, rate))) } else { Err("nodal fields of different lengths".into()) }
+    let moving = if has_inertia { nodes } else { 0 };
+    let lengths = [rate.len(), nodal.velocity.len(), nodal.acceleration.len()];
+    if lengths == [nodes, moving, moving] && [0, nodes].contains(&nodal.out_of_balance.len()) {
+        Ok(Some((nodal, rate)))
+    } else {
+        Err("nodal fields of different lengths".into())
+    }
 }
 
 /// The last converged load step under the loads of the scene, if the checkpoint has it.
@@ -326,7 +330,8 @@ fn restore_refined<const D: usize, L, A>(
     }
     let order = order(&simulation.particles.id, &arrays["id"]).ok_or("ids that are not those of the particles")?;
     let count = simulation.particles.len();
-    let (reference, grid) = (reference(arrays, count)?, grid(arrays)?);
+    let has_inertia = simulation.settings.scheme.has_inertia();
+    let (reference, grid) = (reference(arrays, count)?, grid(arrays, has_inertia)?);
     if reference.is_some() != grid.is_some() {
         return Err("a reference configuration without nodal fields, or the reverse".into());
     }
