@@ -1,5 +1,7 @@
 //! Laws from shared libraries in scenes, compiled here from `examples/laws`.
 
+mod inputs;
+
 use super::support::{Failure, built, failure, in_threads, restored, run_to, with};
 use bfree::material::{Law, allow_library};
 use bfree::scene;
@@ -24,12 +26,17 @@ struct Library {
 impl Library {
     /// `None`, with a loud note, where there is no compiler for this source.
     fn of(source: &str) -> Result<Option<Self>, Failure> {
+        Self::compiled(&Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/laws"), source)
+    }
+
+    /// The same for a source in any folder.
+    fn compiled(sources: &Path, source: &str) -> Result<Option<Self>, Failure> {
         let root = Path::new(env!("CARGO_MANIFEST_DIR"));
         let compiler = if source.ends_with(".c") { "gcc" } else { "gfortran" };
         let folder = tempfile::tempdir()?;
         let path = folder.path().join(format!("lib_{}.so", source.replace('.', "_")));
         let mut command = Command::new(compiler);
-        command.args(["-O2", "-shared", "-fPIC", "-o"]).arg(&path).arg(source).current_dir(root.join("examples/laws"));
+        command.args(["-O2", "-shared", "-fPIC", "-o"]).arg(&path).arg(source).current_dir(sources);
         if compiler == "gcc" {
             command.arg("-I").arg(root.join("tangent-check/include"));
         }
