@@ -7,6 +7,7 @@ mod approximation;
 mod between;
 mod carried;
 mod clouds;
+mod columns;
 mod contact;
 mod damping;
 mod dilatation;
