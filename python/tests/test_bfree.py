@@ -62,6 +62,60 @@ def test_arrays_are_values_of_their_moment():
     assert particles.body.dtype == np.int64 and (particles.body == 0).all()
 
 
+def differ(numbers):
+    """No two numbers are equal up to their sign, and none is zero."""
+    sizes = np.sort(np.abs(np.ravel(numbers)))
+    return sizes[0] > 1e-4 * sizes[-1] and (np.diff(sizes) > 1e-4 * sizes[-1]).all()
+
+
+def test_arrays_in_space_follow_from_the_deformation_gradient():
+    lame, shear, gravity = 900.0, 400.0, np.array([8.0, -15.0, 4.0])
+    material = {"neo_hookean": {"lambda": lame, "shear": shear}}
+    scene = {
+        "grid": {"size": [2, 1, 1], "spacing": 0.125},
+        "approximation": {"bspline": {"degree": 2}},
+        "time": {"step": 0.02, "end": 0.1},
+        "bodies": [{"name": "beam", "shape": {"box": {"min": [0, 0.25, 0.25], "max": [1, 0.75, 0.5]}}, "density": 3, "material": material}],
+        "boundary": {"left": "fixed"},
+        "gravity": {"acceleration": gravity},
+    }
+    for time in (scene["time"], {"step": 0.5, "end": 1, "scheme": "none"}):
+        simulation = bfree.Scene(scene | {"time": time}).build()
+        start = simulation.particles.position
+        *_, step = simulation
+        particles = simulation.particles
+        F, unit, m = particles.deformation_gradient, np.eye(3), particles.mass
+        J, b, C = np.linalg.det(F), F @ F.transpose(0, 2, 1), F.transpose(0, 2, 1) @ F
+        column = J[:, None, None]
+        stress = (lame / 2 * (column**2 - 1) * unit + shear * (b - unit)) / column
+        deviator = stress - np.trace(stress, axis1=1, axis2=2)[:, None, None] / 3 * unit
+        trace = np.trace(C, axis1=1, axis2=2)
+        energy = lame / 4 * (J**2 - 1) - (lame / 2 + shear) * np.log(J) + shear / 2 * (trace - 3)
+        upper = np.triu_indices(3)
+        assert any(differ(H) and differ(s[upper]) for H, s in zip(F - unit, stress))
+        wanted = {
+            "displacement": particles.position - start,
+            "jacobian": J,
+            "strain": (C - unit) / 2,
+            "stress": stress,
+            "principal_stress": np.linalg.eigvalsh(stress)[:, ::-1],
+            "pressure": -np.trace(stress, axis1=1, axis2=2) / 3,
+            "von_mises": np.sqrt(1.5 * (deviator**2).sum(axis=(1, 2))),
+            "energy_density": energy,
+            "mass": 3 * particles.volume,
+        }
+        for name, values in wanted.items():
+            assert np.allclose(getattr(particles, name), values, rtol=1e-9, atol=1e-9), name
+        assert simulation.strain_energy == pytest.approx((particles.volume * energy).sum(), rel=1e-9)
+        if "scheme" in time:
+            assert step.reactions["left"] == pytest.approx(-m.sum() * gravity, rel=1e-6)
+            continue
+        v = particles.velocity
+        assert simulation.momentum == pytest.approx(m @ v, rel=1e-12) and differ(m @ v)
+        assert simulation.kinetic_energy == pytest.approx((m * (v**2).sum(axis=1)).sum() / 2, rel=1e-12)
+        assert simulation.external_work == pytest.approx(m @ (particles.position - start) @ gravity, rel=1e-9)
+
+
 def test_the_tangent_is_the_derivative_of_the_residual():
     # Pressed against the wall, so that something is prescribed and the body is deformed.
     simulation = bfree.Scene(REBOUND, set={"time.end": 22}).build()
