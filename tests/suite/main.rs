@@ -21,6 +21,7 @@ mod free_obstacles;
 mod hostile;
 mod images;
 mod incompressible;
+mod independence;
 mod kept;
 mod ladder;
 mod laws;
