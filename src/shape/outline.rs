@@ -117,7 +117,7 @@ mod tests {
         let grid = Grid { origin: Vector::zeros(), spacing: 0.1, cells: [10, 20] };
         let disc = |radius| Shape::from(Ball { center: Vector::from([0.47, 0.9]), radius });
         let ring = Shape::from(Difference { of: Box::new(disc(0.4)), minus: Box::new(disc(0.25)) });
-        let slope = Polygon::new(vec![[0.1, 0.1], [0.9, 0.1], [0.3, 1.2]].map(Vector::from).to_vec())?;
+        let slope = Polygon::new([[0.1, 0.1], [0.9, 0.1], [0.3, 1.2]].map(Vector::from).to_vec())?;
         let floor = HalfSpace { point: Vector::from([0.0, 0.33]), normal: Vector::from([0.0, 1.0]) };
         for (shape, lines, exact, bound) in [
             (disc(0.4), 1, PI * 0.16, 1e-3),

@@ -27,6 +27,9 @@ const GAP_POINTS: u32 = 3;
 /// smaller than that of regular particles.
 pub(super) const THIN_PART: f64 = 1e-3;
 
+/// A box that lacks no larger part of its volume is full.
+const WHOLE: f64 = 1e-12;
+
 impl<const D: usize> Shape<D> {
     /// Points and volumes that integrate, over the part of the solid in a box, every product of polynomials of this degree along each axis.
     ///
@@ -39,6 +42,9 @@ impl<const D: usize> Shape<D> {
         if !self.has_planes(of) {
             return None;
         }
+        if let Some(points) = self.whole_or_nothing(of, degree, per_axis) {
+            return Some(points);
+        }
         let images = self.images(of);
         let (first, fitted) = self.of_image(&images[0], of, degree, per_axis)?;
         if !fitted || images.len() == 1 {
@@ -50,6 +56,20 @@ impl<const D: usize> Shape<D> {
         }
         all.iter_mut().for_each(|point| point.volume /= images.len() as f64);
         Some(all)
+    }
+
+    /// The points of a box that is full or empty. They do not depend on the order of the axes. `None` for other boxes.
+    fn whole_or_nothing(&self, of: &GridBox<D>, degree: u32, per_axis: u32) -> Option<Vec<Seed<D>>> {
+        let (pieces, gaps) = self.pieces_and_gaps(of);
+        if !gaps.is_empty() {
+            return None;
+        }
+        let volume: f64 = pieces.iter().map(|piece| piece.volume).sum();
+        if volume == 0.0 {
+            return Some(Vec::new());
+        }
+        let whole = whole_box(&pieces).filter(|_| volume >= of.edges.product() * (1.0 - WHOLE))?;
+        Some(whole.in_box(&Layout::Gauss.points(per_axis.max(degree / 2 + 1))))
     }
 
     /// The images x ↦ c + R (x − c) of the solid about the centre of a box in which it rises along all axes, most along the first one: one, or
