@@ -167,6 +167,7 @@ pub mod phases;
 pub mod plan;
 pub mod pooled;
 mod problems;
+pub mod program;
 pub mod scalar;
 pub mod scene;
 pub mod shape;

@@ -1,6 +1,6 @@
 //! `bfree check-law`: the program `tangent-check` as a command.
 
-use super::Failure;
+use super::failure::Failure;
 use clap::Args;
 use std::ffi::OsString;
 use tangent_check::library::child::Host;

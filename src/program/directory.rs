@@ -1,8 +1,8 @@
 //! The directory of the results of a run.
 
-use super::Failure;
-use bfree::checkpoint;
-use bfree::output::{foreign, held};
+use super::failure::Failure;
+use crate::checkpoint;
+use crate::output::{foreign, held};
 use std::ffi::OsStr;
 use std::fs::{File, TryLockError, create_dir_all};
 use std::io::ErrorKind;

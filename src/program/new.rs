@@ -3,8 +3,8 @@
 //! JSON has no comments. Instead, the scene names its JSON Schema, which is written beside the scene. Editors show the sentence of each key
 //! from the schema. The command also prints these sentences.
 
-use super::{Failure, print};
-use bfree::scene::{self, keys};
+use super::failure::{Failure, print};
+use crate::scene::{self, keys};
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 use std::fmt::Write as _;

@@ -1,11 +1,11 @@
 //! `bfree newton`: how Newton's method converges in each step of a scene.
 
+use super::failure::{Failure, print};
 use super::scene_arguments::SceneArguments;
-use super::{Failure, print};
-use bfree::output::plot;
-use bfree::scene::{Scene, time::MAX_STEPS};
-use bfree::simulation::StepReport;
-use bfree::solver::{Convergence, Forcing, NewtonIteration, NewtonSettings};
+use crate::output::plot;
+use crate::scene::{Scene, time::MAX_STEPS};
+use crate::simulation::StepReport;
+use crate::solver::{Convergence, Forcing, NewtonIteration, NewtonSettings};
 use clap::{Args, ValueEnum};
 use std::num::NonZeroU64;
 use std::ops::RangeInclusive;

@@ -1,9 +1,9 @@
 //! Probes of a scene and their particles.
 
-use bfree::output::{Place, Probe, nearest};
-use bfree::scene::{self, Scene, output::At};
-use bfree::simulation::Simulation;
-use bfree::tensor::Vector;
+use crate::output::{Place, Probe, nearest};
+use crate::scene::{self, Scene, output::At};
+use crate::simulation::Simulation;
+use crate::tensor::Vector;
 use serde_json::{Value, json};
 use std::fmt::{Display, Formatter};
 

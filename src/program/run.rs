@@ -1,17 +1,18 @@
 //! `bfree run`.
 
+use super::directory;
+use super::failure::{Failure, INTERRUPTED, print, tell};
 use super::probes::{Bound, bound_probes};
 use super::scene_arguments::{SceneArguments, what_accuracy_sets};
 use super::steps::{Schedule, Steps};
-use super::{Failure, INTERRUPTED, directory, print, tell};
-use bfree::checkpoint::{self, Checkpoints, Identity, Restored};
-use bfree::output::plot::{Look, plot_run};
-use bfree::output::{Audience, Outcome, OutputSettings, Recorder, Reference};
-use bfree::parallel;
-use bfree::plan::SurfaceUse;
-use bfree::scene::{Scene, time::MAX_STEPS};
-use bfree::simulation::{AdvanceError, Simulation};
-use bfree::solver::Stop;
+use crate::checkpoint::{self, Checkpoints, Identity, Restored};
+use crate::output::plot::{Look, plot_run};
+use crate::output::{Audience, Outcome, OutputSettings, Recorder, Reference};
+use crate::parallel;
+use crate::plan::SurfaceUse;
+use crate::scene::{Scene, time::MAX_STEPS};
+use crate::simulation::{AdvanceError, Simulation};
+use crate::solver::Stop;
 use clap::{Args, ValueEnum};
 use serde_json::{Map, Value, json};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGXFSZ};

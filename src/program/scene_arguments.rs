@@ -1,13 +1,13 @@
 //! The scene argument of a command, and `bfree check`.
 
+use super::failure::{Failure, print, tell};
 use super::probes::{Bound, bound_probes};
-use super::{Failure, print, tell};
-use bfree::material::allow_library;
-use bfree::memory;
-use bfree::particles::Particles;
-use bfree::plan::Plan;
-use bfree::scene::{self, Override, Scene, SceneError};
-use bfree::simulation::Simulation;
+use crate::material::allow_library;
+use crate::memory;
+use crate::particles::Particles;
+use crate::plan::Plan;
+use crate::scene::{self, Override, Scene, SceneError};
+use crate::simulation::Simulation;
 use clap::Args;
 use std::error::Error;
 use std::path::{Path, PathBuf};

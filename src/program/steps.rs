@@ -1,10 +1,10 @@
 //! The steps of a run.
 
-use bfree::checkpoint::Checkpoints;
-use bfree::clock::Clock;
-use bfree::output::Recorder;
-use bfree::parallel::in_pool;
-use bfree::simulation::{AdvanceError, Simulation};
+use crate::checkpoint::Checkpoints;
+use crate::clock::Clock;
+use crate::output::Recorder;
+use crate::parallel::in_pool;
+use crate::simulation::{AdvanceError, Simulation};
 use std::error::Error;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
