@@ -1,9 +1,14 @@
 //! Work on all cores, in an order that does not depend on the number of cores.
 //!
 //! Threads receive tasks as `dyn Fn`. Their code is therefore compiled once for each type of parts, and not for every kind of work.
+//!
+//! Shared work is a list of tasks, here called a *region*. The time outside of regions limits the speed-up by threads. [`record`] measures both.
 
 use rayon::prelude::*;
+use std::cell::RefCell;
+use std::panic::Location;
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
 
 /// Sets the number of threads. Without this call there are as many threads as cores.
 ///
@@ -18,9 +23,63 @@ pub fn threads() -> usize {
     rayon::current_num_threads()
 }
 
-/// Whether there is more than one thread.
+/// Whether there is more than one thread. While regions are recorded, the answer is yes.
 pub(crate) fn several() -> bool {
-    threads() > 1
+    threads() > 1 || records()
+}
+
+/// A region that ran in [`record`]: one call of a function of this file.
+#[derive(Clone, Debug)]
+pub struct Region {
+    /// The line that shares the work.
+    pub place: &'static Location<'static>,
+    /// The beginning.
+    pub begin: Instant,
+    /// The end.
+    pub end: Instant,
+    /// Seconds of each task.
+    pub tasks: Vec<f64>,
+}
+
+thread_local! {
+    /// The regions that this thread has recorded, while it records.
+    static REGIONS: RefCell<Option<Vec<Region>>> = const { RefCell::new(None) };
+}
+
+fn records() -> bool {
+    REGIONS.with_borrow(Option::is_some)
+}
+
+/// Runs `f` with the tasks of every region one after the other, and measures them. Results have the same bits as with any number of threads.
+/// Only regions that this thread shares are recorded. A region inside a task belongs to that task.
+///
+/// ```
+/// let mut simulation = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?.build::<2>("scenes".as_ref())?;
+/// let (step, regions) = bfree::parallel::record(|| simulation.step());
+/// assert!(step?.newton.history.iterations.len() > 1);
+/// assert!(regions.iter().all(|region| region.tasks.iter().sum::<f64>() <= (region.end - region.begin).as_secs_f64()));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn record<R>(f: impl FnOnce() -> R) -> (R, Vec<Region>) {
+    REGIONS.set(Some(Vec::new()));
+    let result = f();
+    (result, REGIONS.take().unwrap_or_default())
+}
+
+/// Calls `f(part)` for all parts in order, and records the times.
+fn record_region<P>(place: &'static Location<'static>, parts: impl Iterator<Item = P>, mut f: impl FnMut(P)) {
+    let before = REGIONS.take();
+    let begin = Instant::now();
+    let mut last = begin;
+    let tasks = parts.map(|part| {
+        f(part);
+        let before = std::mem::replace(&mut last, Instant::now());
+        (last - before).as_secs_f64()
+    });
+    let tasks = tasks.collect();
+    let mut regions = before.unwrap_or_default();
+    regions.push(Region { place, begin, end: last, tasks });
+    REGIONS.set(Some(regions));
 }
 
 /// Runs `f` on a thread of the pool. Shared work begins there at once. On any other thread, every piece of shared work first wakes a thread of the
@@ -46,9 +105,12 @@ pub(crate) fn held<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 /// Calls `f(part)` for every part, each on any free thread.
+#[track_caller]
 pub(crate) fn for_each<P: Send>(parts: impl Iterator<Item = P>, f: &(dyn Fn(P) + Sync)) {
     let parts: Vec<P> = parts.collect();
-    if parts.len() > 1 && several() {
+    if records() {
+        record_region(Location::caller(), parts.into_iter(), f);
+    } else if parts.len() > 1 && several() {
         parts.into_par_iter().for_each(f);
     } else {
         parts.into_iter().for_each(f);
@@ -56,6 +118,7 @@ pub(crate) fn for_each<P: Send>(parts: impl Iterator<Item = P>, f: &(dyn Fn(P) +
 }
 
 /// [`for_each`] with scratch space, which is reused from part to part.
+#[track_caller]
 pub(crate) fn for_each_with<P: Send, S: Send + Default>(
     parts: impl Iterator<Item = P>,
     f: &(dyn Fn(&mut S, P) + Sync),
@@ -70,8 +133,35 @@ pub(crate) fn for_each_with<P: Send, S: Send + Default>(
 }
 
 /// `f(0)`, …, `f(count − 1)`.
+#[track_caller]
 pub(crate) fn map<R: Send>(count: usize, f: &(dyn Fn(usize) -> R + Sync)) -> Vec<R> {
-    if count > 1 && several() { (0..count).into_par_iter().map(f).collect() } else { (0..count).map(f).collect() }
+    collect(0..count, f)
+}
+
+/// `f(part)` of every part.
+#[track_caller]
+pub(crate) fn collect<P: Send, R: Send>(parts: impl Iterator<Item = P>, f: &(dyn Fn(P) -> R + Sync)) -> Vec<R> {
+    let parts: Vec<P> = parts.collect();
+    if records() {
+        let mut results = Vec::with_capacity(parts.len());
+        record_region(Location::caller(), parts.into_iter(), |part| results.push(f(part)));
+        results
+    } else if parts.len() > 1 && several() {
+        parts.into_par_iter().map(f).collect()
+    } else {
+        parts.into_iter().map(f).collect()
+    }
+}
+
+/// Elements in one task of [`zip`].
+pub(crate) const PART: usize = 2048;
+
+/// `f(x, y)` for all pairs of elements.
+#[track_caller]
+pub(crate) fn zip<X: Send, Y: Sync>(x: &mut [X], y: &[Y], f: impl Fn(&mut X, &Y) + Sync) {
+    for_each(x.chunks_mut(PART).zip(y.chunks(PART)), &|(x, y): (&mut [X], &[Y])| {
+        x.iter_mut().zip(y).for_each(|(x, y)| f(x, y));
+    });
 }
 
 /// Sorts by the keys, all of which differ.

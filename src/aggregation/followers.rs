@@ -1,6 +1,7 @@
 //! The extension E applied to vector fields, some of whose components are prescribed.
 
 use super::Extension;
+use crate::parallel;
 use crate::scalar::Real;
 use crate::tensor::Vector;
 use std::sync::Arc;
@@ -59,31 +60,50 @@ impl<const D: usize> Followers<D> {
     }
 
     /// u = E û, in place.
-    pub fn extend<T: Real>(&self, field: &mut [Vector<T, D>]) {
-        for (outer, follows, leaders) in self.rows() {
-            let mut sum = Vector::<T, D>::zeros();
-            leaders.for_each(|(leader, weight)| sum += field[leader] * T::lit(weight));
-            (0..D).filter(|&i| follows[i]).for_each(|i| field[outer][i] = sum[i]);
+    pub fn extend<T: Real + Send + Sync>(&self, field: &mut [Vector<T, D>]) {
+        let sum = |place: usize| {
+            let leaders = self.extension.leaders(place);
+            leaders.fold(Vector::<T, D>::zeros(), |sum, (leader, weight)| sum + field[leader] * T::lit(weight))
+        };
+        let sums = in_parts(self.extension.len(), &sum);
+        for ((&outer, follows), sum) in self.extension.outer().iter().zip(&self.follows).zip(sums) {
+            (0..D).filter(|&i| follows[i]).for_each(|i| field[outer as usize][i] = sum[i]);
         }
     }
 
     /// R̂ = Eᵀ R, in place. Components that follow become zero.
-    pub fn restrict<T: Real>(&self, forces: &mut [Vector<T, D>]) {
+    pub fn restrict<T: Real + Send + Sync>(&self, forces: &mut [Vector<T, D>]) {
         self.restrict_with(forces, |weight| weight);
     }
 
     /// |E|ᵀ applied to round-off bounds, in place.
-    pub(crate) fn restrict_magnitudes<T: Real>(&self, magnitudes: &mut [Vector<T, D>]) {
+    pub(crate) fn restrict_magnitudes<T: Real + Send + Sync>(&self, magnitudes: &mut [Vector<T, D>]) {
         self.restrict_with(magnitudes, f64::abs);
     }
 
-    fn restrict_with<T: Real>(&self, forces: &mut [Vector<T, D>], of: impl Fn(f64) -> f64) {
-        for (outer, follows, leaders) in self.rows() {
-            let mut moved = Vector::<T, D>::zeros();
+    fn restrict_with<T: Real + Send + Sync>(&self, forces: &mut [Vector<T, D>], of: impl Fn(f64) -> f64 + Sync) {
+        let mut moved = vec![Vector::<T, D>::zeros(); self.extension.len()];
+        for ((&outer, follows), moved) in self.extension.outer().iter().zip(&self.follows).zip(&mut moved) {
             for i in (0..D).filter(|&i| follows[i]) {
-                moved[i] = std::mem::replace(&mut forces[outer][i], T::zero());
+                moved[i] = std::mem::replace(&mut forces[outer as usize][i], T::zero());
             }
-            leaders.for_each(|(leader, weight)| forces[leader] += moved * T::lit(of(weight)));
         }
+        let inner = self.extension.inner();
+        let sum = |at: usize| {
+            let followers = self.extension.followers(at);
+            let force = forces[inner[at] as usize];
+            followers.fold(force, |sum, (place, weight)| sum + moved[place] * T::lit(of(weight)))
+        };
+        let sums = in_parts(inner.len(), &sum);
+        inner.iter().zip(sums).for_each(|(&leader, sum)| forces[leader as usize] = sum);
     }
+}
+
+/// Number of rows in one part of the work of a thread.
+const PART: usize = 128;
+
+/// `f(0)`, …, `f(count − 1)`.
+fn in_parts<R: Send>(count: usize, f: &(dyn Fn(usize) -> R + Sync)) -> impl Iterator<Item = R> + use<R> {
+    let part = |part: usize| (part * PART..count.min((part + 1) * PART)).map(f).collect::<Vec<R>>();
+    parallel::map(count.div_ceil(PART), &part).into_iter().flatten()
 }

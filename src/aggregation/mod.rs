@@ -41,6 +41,44 @@ pub struct Extension {
     starts: Vec<u32>,
     leaders: Vec<u32>,
     weights: Vec<f64>,
+    transpose: Transpose,
+}
+
+/// Eᵀ: the rows of an extension, sorted by inner node.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Transpose {
+    /// The inner nodes that outer nodes follow, ascending.
+    inner: Vec<u32>,
+    /// For each of these nodes, the start of its row in `followers` and `weights`; the last entry is the end of the last row.
+    starts: Vec<u32>,
+    /// Places of outer nodes.
+    followers: Vec<u32>,
+    weights: Vec<f64>,
+}
+
+impl Transpose {
+    fn of(extension: &Extension) -> Self {
+        let nodes = extension.leaders.iter().max().map_or(0, |&last| last as usize + 1);
+        let mut ends = vec![0_u32; nodes];
+        extension.leaders.iter().for_each(|&leader| ends[leader as usize] += 1);
+        let mut transpose = Self { starts: vec![0], ..Self::default() };
+        let mut end = 0;
+        for (node, count) in ends.iter_mut().enumerate().filter(|(_, count)| **count > 0) {
+            transpose.inner.push(node as u32);
+            (*count, end) = (end, end + *count);
+            transpose.starts.push(end);
+        }
+        transpose.followers = vec![0; extension.leaders.len()];
+        transpose.weights = vec![0.0; extension.leaders.len()];
+        for place in 0..extension.len() {
+            for (leader, weight) in extension.leaders(place) {
+                let at = ends[leader] as usize;
+                (transpose.followers[at], transpose.weights[at]) = (place as u32, weight);
+                ends[leader] += 1;
+            }
+        }
+        transpose
+    }
 }
 
 impl Extension {
@@ -80,6 +118,7 @@ impl Extension {
             }
             extension.starts.push(extension.leaders.len() as u32);
         }
+        extension.transpose = Transpose::of(&extension);
         extension
     }
 
@@ -93,6 +132,7 @@ impl Extension {
             all.leaders.extend(part.leaders.iter().map(|leader| first + leader));
             all.weights.extend(part.weights);
         }
+        all.transpose = Transpose::of(&all);
         all
     }
 
@@ -129,7 +169,21 @@ impl Extension {
 
     /// Bytes of all lists.
     pub fn bytes(&self) -> usize {
-        let Self { outer, starts, leaders, weights, .. } = self;
-        size_of_val(&outer[..]) + size_of_val(&starts[..]) + size_of_val(&leaders[..]) + size_of_val(&weights[..])
+        let Self { outer, starts, leaders, weights, transpose, .. } = self;
+        let numbers = outer.len() + starts.len() + leaders.len();
+        let transposed = transpose.inner.len() + transpose.starts.len() + transpose.followers.len();
+        (numbers + transposed) * size_of::<u32>() + (weights.len() + transpose.weights.len()) * size_of::<f64>()
+    }
+
+    /// The inner nodes that outer nodes follow, ascending.
+    pub(crate) fn inner(&self) -> &[u32] {
+        &self.transpose.inner
+    }
+
+    /// The places of the outer nodes that follow the inner node at `place` of [`Self::inner`], ascending, with their weights.
+    pub(crate) fn followers(&self, place: usize) -> impl Iterator<Item = (usize, f64)> + use<'_> {
+        let Transpose { starts, followers, weights, .. } = &self.transpose;
+        let range = starts[place] as usize..starts[place + 1] as usize;
+        followers[range.clone()].iter().zip(&weights[range]).map(|(&outer, &weight)| (outer as usize, weight))
     }
 }

@@ -30,6 +30,8 @@ macro_rules! approximations {
         }
 
         impl ShapeFunction for Approximation {
+            const IN_SCENES: bool = true;
+
             #[inline]
             fn evaluate<const D: usize>(
                 &self, grid: &Grid<D>, x: &Vector<f64, D>, scratch: &mut Scratch, out: &mut Support<D>,

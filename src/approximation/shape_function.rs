@@ -39,6 +39,10 @@ pub struct Scratch {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub trait ShapeFunction: Validate + Send + Sync {
+    /// Whether scenes use this type. Their steps are compiled once, in this crate.
+    #[doc(hidden)]
+    const IN_SCENES: bool = false;
+
     /// Fills `out` with the nodes that have N ≠ 0 or ∇N ≠ 0 at `x`. After an error the content of `out` means nothing.
     ///
     /// # Errors

@@ -87,6 +87,10 @@ pub type TangentBlocks<const D: usize> = [[Tensor<f64, D>; D]; D];
 ///
 /// A state may come without internal variables (`at.internal` is empty): they then have their values at rest.
 pub trait Law: Send + Sync {
+    /// Whether scenes use this type. Their steps are compiled once, in this crate.
+    #[doc(hidden)]
+    const IN_SCENES: bool = false;
+
     /// Strain energy density `W`, or the incremental potential of the step.
     fn energy<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> T;
 

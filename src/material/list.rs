@@ -61,6 +61,8 @@ macro_rules! materials {
         }
 
         impl Law for Material {
+            const IN_SCENES: bool = true;
+
             $crate::law_of_variants!(Self: $($law,)* Foreign);
 
             fn shipped(&self) -> Option<&dyn Any> {

@@ -52,7 +52,8 @@ pub(super) fn affine<const D: usize>(
         let mut gradient = vec![Tensor::<f64, D>::zeros(); particles.len()];
         for k in 0..D {
             let column = supports.pool().collect(slopes.iter().map(|slope| slope.column(k).into_owned()));
-            supports.each_value(&column, |p, column| gradient[p].set_column(k, &column));
+            let columns = supports.values(&column);
+            gradient.iter_mut().zip(&*columns).for_each(|(gradient, column)| gradient.set_column(k, column));
         }
         // ⟨u − G x⟩ + ⟨G⟩ x_I
         let mut fitted = mean(&|p| field[p] - gradient[p] * x(p));

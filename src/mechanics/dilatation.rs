@@ -185,12 +185,7 @@ impl Cells {
         motion: &[Vector<T, D>],
     ) -> Vec<T> {
         let reference = particles.reference();
-        let mut grown = vec![T::zero(); particles.len()];
-        supports.each_particle(
-            motion,
-            |p, _, g| Deformation::new(g).j * T::lit(reference.volume(p)),
-            |p, more| grown[p] = more,
-        );
+        let grown = supports.evaluate(motion, |p, _, g| Deformation::new(g).j * T::lit(reference.volume(p)));
         let mean = |(members, volume): (&[Member], f64)| {
             let sum = members.iter().fold(T::zero(), |sum, member| sum + grown[member.particle as usize]);
             let change = sum * T::lit(1.0 / volume);

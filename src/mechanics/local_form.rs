@@ -3,7 +3,7 @@
 use crate::lanes::LANES;
 use crate::mechanics::sweep::{At, Group};
 use crate::mechanics::tangent::Tangent;
-use crate::mechanics::terms::Along;
+use crate::mechanics::terms::{Along, ProductAtPoints};
 use crate::solver::LocalForm;
 use crate::tensor::{Tensor, Vector};
 use rustc_hash::FxHashMap;
@@ -16,18 +16,28 @@ impl<const D: usize> Tangent<'_, D> {
         let tiles = D.pow(4);
         // The form takes gradients in units of 1/h.
         let factor = self.supports.grid().spacing.recip().powi(2);
-        for (j, l) in (0..D).flat_map(|j| (0..D).map(move |l| (j, l))) {
-            let (mut unit, mut gradient) = (At::<f64, D, D>::zero(), Tensor::zeros());
-            unit.gradient[j][l] = [1.0; LANES];
-            gradient[(j, l)] = 1.0;
-            self.probe(&unit, &gradient, |group, sums| {
-                for (lane, cell) in in_cells(&cells[group]) {
-                    for (i, k) in (0..D).flat_map(|i| (0..D).map(move |k| (i, k))) {
-                        form.tangents[cell * tiles + ((i * D + k) * D + j) * D + l] +=
-                            factor * sums.gradient[i][k][lane];
+        let gradients: Vec<Tensor<f64, D>> = (0..D * D).map(|jl| unit_gradient(jl / D, jl % D)).collect();
+        let products: Vec<Vec<_>> = gradients.iter().map(|gradient| self.products(gradient)).collect();
+        // The moduli of the cells of each group: ∂σ_ik/∂L_jl at ((i D + k) D + j) D + l.
+        let moduli = self.supports.map_groups(|group| {
+            let (own, slots) = distinct(&cells[group.number]);
+            let mut moduli = vec![0.0; own.len() * tiles];
+            for (jl, products) in products.iter().enumerate() {
+                let (mut unit, mut sums) = (At::<f64, D, D>::zero(), At::<f64, D, D>::zero());
+                unit.gradient[jl / D][jl % D] = [1.0; LANES];
+                products.iter().for_each(|add| add(group, &unit, &mut sums));
+                for (lane, slot) in in_cells(&slots) {
+                    for ik in 0..D * D {
+                        moduli[slot * tiles + ik * D * D + jl] += factor * sums.gradient[ik / D][ik % D][lane];
                     }
                 }
-            });
+            }
+            moduli
+        });
+        for (moduli, cells) in moduli.iter().zip(&cells) {
+            for (moduli, cell) in moduli.chunks(tiles).zip(distinct(cells).0) {
+                form.tangents[cell * tiles..][..tiles].iter_mut().zip(moduli).for_each(|(sum, one)| *sum += one);
+            }
         }
         form
     }
@@ -43,62 +53,55 @@ impl<const D: usize> Tangent<'_, D> {
             follows: self.unknowns.following_mask(self.supports.nodes()),
             ..LocalForm::default()
         };
-        let (mut places, mut cells) = (FxHashMap::default(), vec![[None; LANES]; self.supports.groups()]);
-        self.supports.each_group(|group| cells[group.number] = self.cells_of(group, &mut places, &mut form));
+        let mut places = FxHashMap::default();
+        let mut number = |GroupCells { cells, slots }: GroupCells| -> [Option<usize>; LANES] {
+            let numbers: Vec<usize> = cells.into_iter().map(|cell| cell.add_to(&mut form, &mut places, D)).collect();
+            slots.map(|slot| Some(numbers[slot?]))
+        };
+        let cells = self.supports.map_groups(|group| self.cells_of(group)).into_iter().map(&mut number).collect();
         form.finish_centres();
         let mut unit = At::<f64, D, D>::zero();
         unit.value[0] = [1.0; LANES];
-        self.probe(&unit, &Tensor::zeros(), |group, sums| {
-            for (lane, cell) in in_cells(&cells[group]) {
-                form.masses[cell] += sums.value[0][lane];
-            }
+        let rest = Tensor::zeros();
+        let products = self.products(&rest);
+        let masses = self.supports.map_groups(|group| {
+            let mut sums = At::<f64, D, D>::zero();
+            products.iter().for_each(|add| add(group, &unit, &mut sums));
+            sums.value[0]
         });
+        for (masses, cells) in masses.iter().zip(&cells) {
+            in_cells(cells).for_each(|(lane, cell)| form.masses[cell] += masses[lane]);
+        }
         form.blocks = bytemuck::cast_slice(&self.blocks_under_uniform_motion()).to_vec();
         (form, cells)
     }
 
-    /// Calls `take` with the number of each group, and with the result of the product for a value and a gradient that are the same at all
-    /// particles.
-    fn probe(&self, at: &At<f64, D, D>, gradient: &Tensor<f64, D>, mut take: impl FnMut(usize, At<f64, D, D>)) {
+    /// The products of all terms along one gradient, the same at all particles.
+    fn products<'b>(&'b self, gradient: &'b Tensor<f64, D>) -> Vec<ProductAtPoints<'b, D>> {
         let along = Along::Gradient(gradient);
-        let terms: Vec<_> = self.terms.iter().filter_map(|term| Some(term.product_at_points(along)?.1)).collect();
-        let evaluate = |group: Group<'_>| {
-            let mut sums = At::<f64, D, D>::zero();
-            terms.iter().for_each(|add| add(group, at, &mut sums));
-            sums
-        };
-        self.supports.map_groups(evaluate, |group, sums| take(group.number, sums));
+        self.terms.iter().filter_map(|term| Some(term.product_at_points(along)?.1)).collect()
     }
 
-    /// The cell of each particle of a group in the form; `None` for empty lanes and for surface points, which belong to no cell. Adds new
-    /// cells to the form, and the share of the particle in its cell.
-    fn cells_of(
-        &self,
-        group: Group<'_>,
-        places: &mut FxHashMap<[u32; 3], usize>,
-        form: &mut LocalForm,
-    ) -> [Option<usize>; LANES] {
+    /// The cells of the particles of a group. Surface points belong to no cell.
+    fn cells_of(&self, group: Group<'_>) -> GroupCells {
         let (grid, reference) = (self.supports.grid(), self.particles.reference());
         let volume = grid.spacing.powi(D as i32);
-        let mut cells = [None; LANES];
-        let solid = cells.iter_mut().zip(group.particles).filter(|(_, p)| self.particles.is_solid(**p as usize));
-        for (of, &p) in solid {
+        let mut all = GroupCells::default();
+        let lanes = group.particles.iter().enumerate();
+        for (lane, &p) in lanes.filter(|(_, p)| self.particles.is_solid(**p as usize)) {
             let x = &reference.position[p as usize];
             let within = grid.cell(x).unwrap_or([0; D]);
             let at = self.supports.in_lattice(self.supports.field_of(self.particles.body[p as usize]), within);
-            let cell = *places.entry(at).or_insert_with(|| {
-                form.push_cell(at, D.pow(4));
-                form.cells.len() - 1
-            });
             let share = reference.volume(p as usize) / volume;
-            *of = Some(cell);
-            form.filled[cell] += share;
+            let slot = all.slot(at);
+            all.slots[lane] = Some(slot);
+            all.cells[slot].share += share;
             for k in 0..D {
                 let local = (x[k] - grid.origin[k]) / grid.spacing;
-                form.centres[cell][k] += share * (local + f64::from(at[k] - within[k]));
+                all.cells[slot].centre[k] += share * (local + f64::from(at[k] - within[k]));
             }
         }
-        cells
+        all
     }
 
     /// For each node, the force at the node under uniform motions of its nodal field along the axes, from the terms at nodes. The other fields
@@ -116,6 +119,62 @@ impl<const D: usize> Tangent<'_, D> {
         }
         blocks
     }
+}
+
+/// The share of a group's particles in a cell: their volume over that of the cell, and Σ share x.
+#[derive(Clone, Debug)]
+struct CellShare {
+    at: [u32; 3],
+    share: f64,
+    centre: [f64; 3],
+}
+
+impl CellShare {
+    /// Adds the share to the form. Returns the number of the cell there. `places` are the numbers of the cells so far.
+    fn add_to(self, form: &mut LocalForm, places: &mut FxHashMap<[u32; 3], usize>, dimension: usize) -> usize {
+        let cell = *places.entry(self.at).or_insert_with(|| {
+            form.push_cell(self.at, dimension.pow(4));
+            form.cells.len() - 1
+        });
+        form.filled[cell] += self.share;
+        form.centres[cell].iter_mut().zip(self.centre).for_each(|(sum, centre)| *sum += centre);
+        cell
+    }
+}
+
+/// The cells of a group, and for each lane the place of its cell among them.
+#[derive(Clone, Debug, Default)]
+struct GroupCells {
+    cells: Vec<CellShare>,
+    slots: [Option<usize>; LANES],
+}
+
+impl GroupCells {
+    /// The place of a cell, which is added if it is not there.
+    fn slot(&mut self, at: [u32; 3]) -> usize {
+        self.cells.iter().position(|cell| cell.at == at).unwrap_or_else(|| {
+            self.cells.push(CellShare { at, share: 0.0, centre: [0.0; 3] });
+            self.cells.len() - 1
+        })
+    }
+}
+
+/// The gradient e_j ⊗ e_l.
+fn unit_gradient<const D: usize>(j: usize, l: usize) -> Tensor<f64, D> {
+    Tensor::from_fn(|i, k| if (i, k) == (j, l) { 1.0 } else { 0.0 })
+}
+
+/// The cells of a group, each of them once, and for each lane the place of its cell among them.
+fn distinct(cells: &[Option<usize>; LANES]) -> (Vec<usize>, [Option<usize>; LANES]) {
+    let mut own = Vec::new();
+    let slots = cells.map(|cell| {
+        let cell = cell?;
+        Some(own.iter().position(|&one| one == cell).unwrap_or_else(|| {
+            own.push(cell);
+            own.len() - 1
+        }))
+    });
+    (own, slots)
 }
 
 /// The pairs (lane, cell) of the lanes that have a cell.

@@ -1,7 +1,7 @@
 //! The mass operator M̃ = (1−ε) M + ε lumped(M), with M_IJ = Σ_p m N_I N_J (eq. 42): product, projection, diagonal.
 
 use crate::aggregation::Followers;
-use crate::mechanics::sweep::{Supports, Weights};
+use crate::mechanics::sweep::{Mode, Supports, Weights};
 use crate::particles::Particles;
 use crate::pooled::Pooled;
 use crate::solver::{ConjugateGradientSettings, LinearError, LinearOperator, conjugate_gradient};
@@ -57,11 +57,14 @@ impl<const D: usize> Mass<'_, D> {
             *out += u * (factor * (self.lumping * m));
         }
         if self.lumping < 1.0 {
-            let mut at_particles = self.supports.pool().filled(self.particles.len(), Vector::zeros());
-            self.supports.each_value(u, |p, value| at_particles[p] = value);
             let weight = factor * (1.0 - self.lumping);
             mutant!("mass: the product takes ε for 1 − ε": weight = factor * self.lumping);
-            self.supports.spread(out, |p| at_particles[p] * (weight * self.particles.mass[p]));
+            self.supports.accumulate(Some(u), Mode::VALUE, out, |group, at, sums| {
+                for (lane, &p) in group.particles.iter().enumerate() {
+                    let weight = weight * self.particles.mass[p as usize];
+                    (0..D).for_each(|c| sums.value[c][lane] += weight * at.value[c][lane]);
+                }
+            });
         }
     }
 

@@ -122,9 +122,7 @@ impl Smoothing {
         let mean = nodal_mean(particles, supports, mass, &velocity);
         let squares = supports.pool().collect(velocity.iter().map(|v| Vector::from([v.norm_squared()])));
         let mean_square = nodal_mean(particles, supports, mass, &squares);
-        let mut at_particles = velocity;
-        supports.each_value(&mean, |p, mean| at_particles[p] = mean);
-        let mean_of_mean = nodal_mean(particles, supports, mass, &at_particles);
+        let mean_of_mean = nodal_mean(particles, supports, mass, &supports.values(&mean));
         let share = |((v, v_twice), square): ((&Vector<f64, D>, &Vector<f64, D>), &Vector<f64, 1>)| {
             let variance = (square[0] - v.norm_squared()).max(0.0) + ROUND_OFF * square[0];
             let q = if variance > 0.0 { (v - v_twice).norm_squared() / variance } else { 0.0 };
@@ -153,14 +151,18 @@ impl Smoothing {
         let mut change = supports.pool().collect(field.iter().copied());
         for _ in 0..self.order {
             let smooth = nodal_mean(particles, supports, mass, &change);
-            supports.each_value(&smooth, |p, smooth| change[p] -= smooth);
+            change.iter_mut().zip(&*supports.values(&smooth)).for_each(|(change, smooth)| *change -= smooth);
         }
         change.iter_mut().for_each(|r| *r *= -theta);
         if let Some(shares) = at_kinks {
             let mut drawn = nodal_mean(particles, supports, mass, field);
             drawn.iter_mut().zip(shares).for_each(|(u, &share)| *u *= share);
-            supports.each_value::<1>(bytemuck::cast_slice(shares), |p, share| change[p] -= field[p] * share[0]);
-            supports.each_value(&drawn, |p, drawn| change[p] += drawn);
+            let shares = supports.values::<1>(bytemuck::cast_slice(shares));
+            let drawn = supports.values(&drawn);
+            for (((change, u), share), drawn) in change.iter_mut().zip(field).zip(&*shares).zip(&*drawn) {
+                *change -= u * share[0];
+                *change += drawn;
+            }
         }
         change
     }

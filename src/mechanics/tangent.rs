@@ -8,6 +8,7 @@ use crate::mechanics::sweep::{Group, Mode, Quadratic, Supports};
 use crate::mechanics::terms::{Along, Linearized, MixedCells, Piece};
 use crate::mechanics::trial::Trial;
 use crate::mechanics::unknowns::Unknowns;
+use crate::parallel::{self, PART};
 use crate::particles::{Body, Particles};
 use crate::pooled::Pooled;
 use crate::solver::{LinearOperator, Linearization, LocalForm};
@@ -61,7 +62,7 @@ impl<const D: usize> Tangent<'_, D> {
 
     /// K u, with given changes of the pressures of averaged cells in place of those that u causes.
     pub(super) fn product_under(&self, u: &[Vector<f64, D>], pressures: Option<&[f64]>, out: &mut [Vector<f64, D>]) {
-        out.fill(Vector::zeros());
+        parallel::for_each(out.chunks_mut(PART), &|out: &mut [Vector<f64, D>]| out.fill(Vector::zeros()));
         let extended = self.unknowns.extended_in(self.supports.pool(), u);
         let u = extended.as_deref().unwrap_or(u);
         self.terms.iter().for_each(|term| term.add_product_at_nodes(u, out));
@@ -117,9 +118,8 @@ impl<const D: usize> Tangent<'_, D> {
             }
             added
         };
-        self.supports.map_groups(corrections, |_, added| {
-            added.into_iter().for_each(|(node, block)| blocks[node] += block);
-        });
+        let added = self.supports.map_groups(corrections);
+        added.into_iter().flatten().for_each(|(node, block)| blocks[node] += block);
     }
 }
 

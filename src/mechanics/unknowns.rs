@@ -4,6 +4,7 @@ use crate::aggregation::{Extension, Followers, Occupied, Pieces};
 use crate::grid::indices;
 use crate::mechanics::loads::PrescribedDof;
 use crate::mechanics::sweep::{Quadratic, Supports};
+use crate::parallel::{self, PART};
 use crate::particles::Particles;
 use crate::pooled::{Pool, Pooled};
 use crate::scalar::Real;
@@ -31,11 +32,13 @@ fn of_field<const D: usize>(
 ) -> (usize, Extension) {
     let (grid, reference) = (supports.grid(), particles.reference());
     let in_field = |p: usize| supports.field_of(particles.body[p]) == field;
-    let solid = || (0..particles.len()).filter(|&p| particles.is_solid(p) && in_field(p));
     let local = |p: usize, k: usize| grid.axis(k).local(reference.position[p][k]).unwrap_or(0.0);
-    let cell = |p: usize| std::array::from_fn(|k| pieces.cell(local(p, k), grid.cells[k]));
-    let mut volumes: FxHashMap<[u32; D], f64> = solid().map(|p| (cell(p), 0.0)).collect();
-    for p in solid() {
+    // The cells of the particles, and the volumes in all cells that their domains overlap.
+    let add = |p: usize, own: &mut Vec<[u32; D]>, volumes: &mut FxHashMap<[u32; D], f64>| {
+        let cell = std::array::from_fn(|k| pieces.cell(local(p, k), grid.cells[k]));
+        if own.last() != Some(&cell) {
+            own.push(cell);
+        }
         // The domain is a box. At F = I the box is a cube of the particle's volume. Its edge along axis k grows with |row k of F|.
         let f = identity::<f64, D>() + reference.displacement_gradient[p];
         let side = (particles.volume[p] / grid.spacing.powi(D as i32)).powf(1.0 / D as f64);
@@ -43,9 +46,22 @@ fn of_field<const D: usize>(
         let along: [_; D] = std::array::from_fn(|k| pieces.overlaps(local(p, k), length(k), grid.cells[k]));
         for which in indices::<D>(std::array::from_fn(|k| along[k].len() as u64)) {
             let parts: [(u32, f64); D] = std::array::from_fn(|k| along[k][which[k] as usize]);
-            if let Some(volume) = volumes.get_mut(&parts.map(|(cell, _)| cell)) {
-                *volume += reference.volume(p) * parts.iter().map(|(_, part)| part).product::<f64>();
-            }
+            let volume = volumes.entry(parts.map(|(cell, _)| cell)).or_insert(0.0);
+            *volume += reference.volume(p) * parts.iter().map(|(_, part)| part).product::<f64>();
+        }
+    };
+    let parts = parallel::map(particles.len().div_ceil(PART), &|part| {
+        let (mut own, mut volumes) = (Vec::new(), FxHashMap::default());
+        let of_part = part * PART..particles.len().min((part + 1) * PART);
+        of_part.filter(|&p| particles.is_solid(p) && in_field(p)).for_each(|p| add(p, &mut own, &mut volumes));
+        (own, volumes)
+    });
+    let mut volumes: FxHashMap<[u32; D], f64> =
+        parts.iter().flat_map(|(own, _)| own).map(|&cell| (cell, 0.0)).collect();
+    // A cell takes its volumes in the order of the parts.
+    for (cell, more) in parts.into_iter().flat_map(|(_, volumes)| volumes) {
+        if let Some(volume) = volumes.get_mut(&cell) {
+            *volume += more;
         }
     }
     let share = |(cell, volume): (&[u32; D], &f64)| {
@@ -95,7 +111,7 @@ impl<'a, const D: usize> Unknowns<'a, D> {
     }
 
     /// E û
-    pub fn extended<'b, T: Real>(&self, field: &'b [Vector<T, D>]) -> Cow<'b, [Vector<T, D>]> {
+    pub fn extended<'b, T: Real + Send + Sync>(&self, field: &'b [Vector<T, D>]) -> Cow<'b, [Vector<T, D>]> {
         let mut field = Cow::Borrowed(field);
         if !self.followers.is_empty() {
             self.followers.extend(field.to_mut());
@@ -105,9 +121,13 @@ impl<'a, const D: usize> Unknowns<'a, D> {
 
     /// E û in pooled memory; `None` if no node follows others.
     pub fn extended_in(&self, pool: &Pool, field: &[Vector<f64, D>]) -> Option<Pooled<Vector<f64, D>>> {
-        let mut field = (!self.followers.is_empty()).then(|| pool.collect(field.iter().copied()))?;
-        self.followers.extend(&mut field);
-        Some(field)
+        if self.followers.is_empty() {
+            return None;
+        }
+        let mut extended = pool.unspecified(field.len(), Vector::zeros());
+        parallel::zip(&mut extended, field, |extended, u| *extended = *u);
+        self.followers.extend(&mut extended);
+        Some(extended)
     }
 
     /// Sets the prescribed entries to zero.
@@ -170,10 +190,7 @@ impl<'a, const D: usize> Unknowns<'a, D> {
     pub fn reached(&self, supports: &Supports<D>) -> Vec<bool> {
         let mut outer: Pooled<Vector<f64, D>> = supports.field();
         self.followers.rows().for_each(|(node, ..)| outer[node].fill(1.0));
-        let mut reached = vec![false; supports.particles()];
-        let sees = |_: usize, n: Vector<f64, D>, grad_n: Tensor<f64, D>| n.iter().chain(&grad_n).any(|x| *x != 0.0);
-        supports.each_particle(&outer, sees, |p, is| reached[p] = is);
-        reached
+        supports.evaluate(&outer, |_, n, grad_n| n.iter().chain(&grad_n).any(|x| *x != 0.0))
     }
 
     /// Adds corrections of the diagonal blocks of a quadratic form at one particle: effective shape functions replace N and ∇N.

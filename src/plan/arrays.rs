@@ -140,12 +140,13 @@ impl<const D: usize, L: Law, A: ShapeFunction> Inventory<'_, D, L, A> {
         let krylov_vectors = match simulation.krylov().0 {
             // The basis; residual, correction, trial and product.
             Krylov::Gmres { restart } => restart as usize + 5,
-            Krylov::Automatic | Krylov::ConjugateGradient => 5,
+            Krylov::Automatic | Krylov::ConjugateGradient => 7,
         };
         vec![
             (true, "linearized tangent", linearized),
             (averages, "particles: mean dilatation", self.particles * dilatation_bytes),
             (averages, "linearized tangent: mean dilatation", linearized_dilatation),
+            (supports.box_bytes() > 0, "boxes of nodes, one for each block of cells", supports.box_bytes()),
             (true, "preconditioner: diagonal blocks", nodes * Self::TENSOR),
             (followers > 0, "nodes that follow others, and their weights", followers),
             (multigrid, "preconditioner: multigrid levels", multigrid_bytes(nodes, D)),

@@ -12,10 +12,21 @@ use crate::grid::Grid;
 use crate::mechanics::smoothing::Smoothing;
 use crate::particles::{self, Particles};
 use crate::shape::Shape;
-use crate::simulation::{Settings, Simulation};
+use crate::simulation::{Settings, Simulation, same};
 use crate::solver::{Forcing, NewtonSettings};
 use crate::tensor::Vector;
 use std::path::Path;
+
+type Build<const D: usize> = fn(&Scene, &Path, u64) -> Result<Simulation<D>, BuildError>;
+
+// Compiled once, in this crate, see `simulation/compiled.rs`.
+static BUILD_1: Build<1> = Scene::build_in_this_crate;
+static BUILD_2: Build<2> = Scene::build_in_this_crate;
+static BUILD_3: Build<3> = Scene::build_in_this_crate;
+
+fn other_dimension(dimension: usize) -> BuildError {
+    BuildError::at("grid", format!("does not fit {dimension} dimensions"))
+}
 
 impl Scene {
     /// The dimension: 1 (uniaxial strain), 2 (plane strain) or 3.
@@ -62,8 +73,18 @@ impl Scene {
     /// # Errors
     /// The errors of [`Self::build`], and particles that certainly need more memory, before room is made for them.
     pub fn build_within<const D: usize>(&self, folder: &Path, memory: u64) -> Result<Simulation<D>, BuildError> {
-        let other = || BuildError::at("grid", format!("does not fit {D} dimensions"));
-        let grid: Grid<D> = self.grid.build().ok_or_else(other)?;
+        let built = match D {
+            1 => same(BUILD_1(self, folder, memory)),
+            2 => same(BUILD_2(self, folder, memory)),
+            3 => same(BUILD_3(self, folder, memory)),
+            _ => None,
+        };
+        built.unwrap_or_else(|| Err(other_dimension(D)))
+    }
+
+    /// [`Self::build_within`], compiled where it is called.
+    fn build_in_this_crate<const D: usize>(&self, folder: &Path, memory: u64) -> Result<Simulation<D>, BuildError> {
+        let grid: Grid<D> = self.grid.build().ok_or_else(|| other_dimension(D))?;
         self.shapes().iter().try_for_each(|(path, shape)| shape.read_files(path, folder))?;
         for (path, curve) in self.curves() {
             curve.read(folder).map_err(|error| BuildError::at(format!("{path}.file"), error))?;

@@ -189,7 +189,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// The positions of all particles at the end of the step.
     fn end_positions(&self, step: &Step<'_, D, L>, phi: &[Vector<f64, D>]) -> Vec<Vector<f64, D>> {
         let mut positions = self.particles.reference().position.to_vec();
-        step.supports.each_value(phi, |p, u| positions[p] += u);
+        positions.iter_mut().zip(&*step.supports.values(phi)).for_each(|(x, u)| *x += u);
         positions
     }
 

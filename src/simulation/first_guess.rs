@@ -43,7 +43,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         }
         let poses: Vec<Pose<D>> = contacts.obstacles.iter().map(|one| one.pose(equilibrium.step.time)).collect();
         let mut positions = self.particles.reference().position.to_vec();
-        supports.each_value(phi, |p, u| positions[p] += u);
+        positions.iter_mut().zip(&*supports.values(phi)).for_each(|(x, u)| *x += u);
         let own = |field: u32| {
             let particles = contacts.points.iter().map(|point| point.particle);
             let own = particles.filter(|&p| supports.field_of(self.particles.body[p]) == field);

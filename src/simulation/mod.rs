@@ -1,6 +1,7 @@
 //! A simulation: the state at the last converged step, and the step that advances this state (`step.rs`).
 
 mod balance;
+mod compiled;
 mod contacts;
 mod entry;
 mod first_guess;
@@ -16,6 +17,7 @@ mod touching;
 mod work;
 
 pub use crate::mechanics::loads::Reaction;
+pub(crate) use compiled::same;
 pub use contacts::ContactForces;
 pub use history::History;
 pub use next_step::NextStep;
@@ -343,7 +345,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             Points { fields: Fields::of(&self.bodies, &self.particles.body), ..Points::at(&self.particles.position) };
         let (supports, nodes) = Supports::rebuilt(None, &self.approximation, &self.grid, &points, &Pool::default())?;
         let nodal: Vec<_> = nodes.positions(&self.grid).map(|(_, x)| velocity(&x)).collect();
-        self.particles.velocity = supports.values(&nodal);
+        self.particles.velocity = supports.values(&nodal).to_vec();
         Ok(())
     }
 
@@ -391,7 +393,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let unbalanced = equilibrium.residual::<f64>(&nodal.acceleration)?;
         nodal.accelerate(&self.particles, &supports, &unbalanced);
         let nodal = nodal.with_prescribed(&prescribed).extended(&unknowns);
-        self.particles.acceleration = supports.values(&nodal.acceleration);
+        self.particles.acceleration = supports.values(&nodal.acceleration).to_vec();
         Ok(())
     }
 }

@@ -14,17 +14,30 @@ use crate::nodes::Nodes;
 use crate::solver::LinearError;
 
 impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
-    /// The shape functions of a step; those of the last step if the grid is not reset.
+    /// The shape functions of a step; those of the last step if the grid is not reset. The particles then lie in the order of the blocks.
     pub(super) fn supports(&mut self) -> Result<Supports<D>, SupportError> {
         let resets = self.history.resets_grid();
         match self.workspace.supports.take() {
             Some(supports) if !resets && self.workspace.supports_are_valid => Ok(supports.again()),
-            spare => self.new_supports(spare),
+            spare => {
+                let mut supports = self.unaggregated(spare)?;
+                if let Some(order) = supports.block_order() {
+                    self.rearrange(&order);
+                    supports.rearrange();
+                }
+                // Sums over particles are made in the order of the blocks, as after a restart.
+                Ok(self.aggregated(supports))
+            }
         }
     }
 
     /// The shape functions in the reference configuration, in the memory of `spare`, which is no longer needed.
     pub(crate) fn new_supports(&self, spare: Option<Supports<D>>) -> Result<Supports<D>, SupportError> {
+        Ok(self.aggregated(self.unaggregated(spare)?))
+    }
+
+    /// [`Self::new_supports`] where every node is an unknown.
+    fn unaggregated(&self, spare: Option<Supports<D>>) -> Result<Supports<D>, SupportError> {
         let Self { particles, bodies, loads, approximation, grid, settings, workspace, .. } = self;
         let fields = Fields::of(bodies, &particles.body);
         let mut points = Points { ids: Some(&particles.id), fields, ..Points::at(particles.reference().position) };
@@ -32,8 +45,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             let at_surface = approximation.separable().map_or(AtSurface::Own, Separable::at_surface);
             points = at_surface_points(points, particles, loads, grid, at_surface);
         }
-        let (supports, _) = Supports::rebuilt(spare, approximation, grid, &points, &workspace.pool)?;
-        Ok(self.aggregated(supports))
+        Ok(Supports::rebuilt(spare, approximation, grid, &points, &workspace.pool)?.0)
     }
 
     /// The shape functions with [`aggregation`](crate::aggregation), if the settings ask for it: nodes with little support from a body then

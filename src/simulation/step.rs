@@ -2,7 +2,7 @@
 
 use super::balance::Balance;
 use super::report::Spent;
-use super::{AdvanceError, FailedAttempt, Simulation, StepError, StepReport};
+use super::{AdvanceError, FailedAttempt, Simulation, StepError, StepReport, compiled};
 use crate::approximation::ShapeFunction;
 use crate::material::Law;
 use crate::mechanics::sweep::Supports;
@@ -15,29 +15,40 @@ use crate::solver::NewtonReport;
 /// A step grows only if its error is at most this part of the tolerance. A step of twice the length has eight times the error.
 const ROOM: f64 = 0.1;
 
-impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
+impl<const D: usize, L: Law + 'static, A: ShapeFunction + 'static> Simulation<D, L, A> {
     /// One step of Algorithm 1, from t_n to t_{n+1} = t_n + Δt.
     ///
     /// ```
     /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
     /// let mut simulation = scene.build::<2>("scenes".as_ref())?;
     /// simulation.particles.velocity.iter_mut().for_each(|v| *v *= 1e4);
-    /// let before = simulation.particles.clone();
+    /// let before = simulation.particles.by_id();
     /// // A step that would carry particles out of the box fails, and leaves the state as it was.
     /// let error = simulation.step().err().ok_or("out of the box")?;
     /// assert!(error.to_string().contains("leaves the grid"), "{error}");
-    /// assert_eq!((simulation.particles, simulation.clock.steps()), (before, 0));
+    /// assert_eq!((simulation.particles.by_id(), simulation.clock.steps()), (before, 0));
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     ///
     /// # Errors
-    /// No equilibrium was found, or a particle would leave the grid. The simulation is then as before the call.
+    /// No equilibrium was found, or a particle would leave the grid. The simulation is then as before the call, except for the order of the
+    /// particles in memory.
     pub fn step(&mut self) -> Result<StepReport<D>, StepError> {
         self.attempt(&mut Spent::nothing())
     }
 
     /// A step like [`Self::step`]. `spent` counts the work, also if the step fails.
     fn attempt(&mut self, spent: &mut Spent) -> Result<StepReport<D>, StepError> {
+        // The compiler leaves the other branch away.
+        if const { L::IN_SCENES && A::IN_SCENES && D <= 3 } {
+            compiled::step(self, spent).unwrap_or_else(|| unreachable!("this is the simulation of a scene"))
+        } else {
+            self.attempt_in_this_crate(spent)
+        }
+    }
+
+    /// [`Self::attempt`], compiled where it is called.
+    pub(super) fn attempt_in_this_crate(&mut self, spent: &mut Spent) -> Result<StepReport<D>, StepError> {
         self.particles.make_room_for_internal(&self.bodies);
         let (dt, scheme, watch) = (self.clock.step(), self.settings.scheme.clone(), &mut spent.watch);
 
@@ -121,15 +132,11 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         }
     }
 
-    /// Stores the shape functions for the next step, or their memory alone if it cannot use them. Reorders the particles if passes over the
-    /// particles leap too often in memory. Refines surfaces that have stretched, because a new grid is the time for it.
+    /// Stores the shape functions for the next step, or their memory alone if it cannot use them. Refines surfaces that have stretched, because
+    /// a new grid is the time for it.
     fn store_supports(&mut self, supports: Supports<D>) {
-        let order = supports.leaping();
-        if let Some(order) = &order {
-            self.rearrange(order);
-        }
-        self.workspace.supports_are_valid = !self.history.resets_grid() && order.is_none();
-        self.workspace.supports = Some(if order.is_some() { supports.rearranged() } else { supports });
+        self.workspace.supports_are_valid = !self.history.resets_grid();
+        self.workspace.supports = Some(supports);
         self.refine_surfaces(self.load() + self.clock.step());
     }
 

@@ -1,6 +1,6 @@
 //! Preconditioned conjugate gradients (Saad, Iterative Methods for Sparse Linear Systems, 2nd ed., alg. 9.1).
 
-use super::vector::{axpy, dot, norm, xpby};
+use super::vector::{axpy, dot, norm, norm_with, update_pair, xpby};
 use super::{LinearError, LinearOperator, LinearOutcome, LinearReport, begin, finite, true_residual};
 use crate::pooled::{Pool, Pooled};
 
@@ -58,7 +58,7 @@ pub struct ConjugateGradientSettings {
 /// ```
 ///
 /// # Errors
-/// A setting is out of range, the lengths differ, or a number is NaN or infinite.
+/// A setting is out of range, the lengths differ, or a number is NaN or infinite. `solution` then means nothing.
 pub fn conjugate_gradient(
     operator: &dyn LinearOperator,
     preconditioner: &dyn LinearOperator,
@@ -102,7 +102,7 @@ fn descend(
     max_iterations: usize,
     report: &mut LinearReport,
 ) -> Result<LinearOutcome, LinearError> {
-    let mut x = r.pool().collect(solution.iter().copied());
+    let mut iterates = Iterates::new(solution, r.pool());
     let (mut z, mut q) = (r.pool().filled(r.len(), 0.0), r.pool().filled(r.len(), 0.0));
     preconditioner.apply(r, &mut z);
     let mut p = z.clone();
@@ -114,6 +114,7 @@ fn descend(
     loop {
         let at = report.iterations;
         if let Some(outcome) = ends(finite(rz, "r·z", at)?, at >= max_iterations, at - best_at > r.len() + PATIENCE) {
+            solution.copy_from_slice(iterates.best());
             return Ok(outcome);
         }
         operator.apply(&p, &mut q);
@@ -122,24 +123,21 @@ fn descend(
         let curvature = p_a_p / p_m_p;
         mutant!("solver: negative curvature counts as positive": curvature = curvature.abs());
         if let Some(outcome) = unusable(curvature, &mut largest) {
-            if outcome == LinearOutcome::NegativeCurvature {
-                if x.iter().all(|x| *x == 0.0) {
-                    // The step length for a curvature of the opposite sign.
-                    axpy(-rz / p_a_p, &p, &mut x);
-                }
-                solution.copy_from_slice(&x);
-            }
+            solution.copy_from_slice(match outcome {
+                // The step length for a curvature of the opposite sign.
+                LinearOutcome::NegativeCurvature => iterates.last_or_step(-rz / p_a_p, &p),
+                _ => iterates.best(),
+            });
             return Ok(outcome);
         }
-        // α = r·z / p·Ap
-        axpy(rz / p_a_p, &p, &mut x);
-        axpy(-rz / p_a_p, &q, r);
+        let square = iterates.advance(rz / p_a_p, [&p, &q], r);
         report.iterations += 1;
-        let r_norm = finite(norm(r), "the norm of the residual", at)?;
+        let r_norm = finite(norm_with(square, r), "the norm of the residual", at)?;
         if r_norm < best {
             (best, best_at) = (r_norm, report.iterations);
-            solution.copy_from_slice(&x);
+            iterates.is_best = true;
             if r_norm <= target {
+                solution.copy_from_slice(&iterates.x);
                 return Ok(LinearOutcome::Converged);
             }
         }
@@ -150,6 +148,49 @@ fn descend(
         xpby(&z, β, &mut p);
         rz = rz_new;
         p_m_p = rz + β * β * p_m_p;
+    }
+}
+
+/// The present iterate and the best one.
+struct Iterates {
+    x: Pooled<f64>,
+    best: Pooled<f64>,
+    /// The next iterate is written here, so that the best one stays without a copy.
+    next: Pooled<f64>,
+    /// Whether x is the best iterate.
+    is_best: bool,
+}
+
+impl Iterates {
+    fn new(start: &[f64], pool: &Pool) -> Self {
+        let [x, best, next] = [(); 3].map(|()| pool.collect(start.iter().copied()));
+        Self { x, best, next, is_best: true }
+    }
+
+    fn best(&self) -> &[f64] {
+        if self.is_best { &self.x } else { &self.best }
+    }
+
+    /// x ← x + α p, r ← r − α A p, with `[p, A p]`. Returns r·r.
+    fn advance(&mut self, α: f64, [p, q]: [&[f64]; 2], r: &mut [f64]) -> f64 {
+        let square = update_pair([p, q, &self.x], &mut self.next, r, |[p, q, x], next, r| {
+            *next = x + α * p;
+            *r -= α * q;
+        });
+        if self.is_best {
+            std::mem::swap(&mut self.x, &mut self.best);
+        }
+        std::mem::swap(&mut self.x, &mut self.next);
+        self.is_best = false;
+        square
+    }
+
+    /// The last iterate. If it is zero, a step along p of the given length.
+    fn last_or_step(&mut self, length: f64, p: &[f64]) -> &[f64] {
+        if self.x.iter().all(|x| *x == 0.0) {
+            axpy(length, p, &mut self.x);
+        }
+        &self.x
     }
 }
 

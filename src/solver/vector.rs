@@ -23,7 +23,7 @@
 use crate::parallel;
 
 /// Entries per partial sum.
-const CHUNK: usize = 4096;
+const CHUNK: usize = 2048;
 
 /// Below this length, waking the threads costs more than the work.
 const PARALLEL: usize = 8 * CHUNK;
@@ -57,7 +57,11 @@ const SAFE_SQUARE: f64 = 1e-280;
 
 /// `√(Σ xᵢ²)`; not finite if any entry is not.
 pub fn norm(x: &[f64]) -> f64 {
-    let square = dot(x, x);
+    norm_with(dot(x, x), x)
+}
+
+/// [`norm`], with `square` = x·x.
+pub(super) fn norm_with(square: f64, x: &[f64]) -> f64 {
     if (SAFE_SQUARE..=f64::MAX).contains(&square) {
         return square.sqrt();
     }
@@ -100,6 +104,25 @@ pub(super) fn update(x: &[f64], y: &mut [f64], f: impl Fn(f64, f64) -> f64 + Syn
     } else {
         parallel::for_each(x.chunks(CHUNK).zip(y.chunks_mut(CHUNK)), &chunk);
     }
+}
+
+/// Calls `f([aᵢ, bᵢ, …], xᵢ, yᵢ)` for all entries. Returns y·y.
+pub(super) fn update_pair<const N: usize>(
+    given: [&[f64]; N],
+    x: &mut [f64],
+    y: &mut [f64],
+    f: impl Fn([f64; N], &mut f64, &mut f64) + Sync,
+) -> f64 {
+    let chunk = |(k, (x, y)): (usize, (&mut [f64], &mut [f64]))| {
+        let given = given.map(|a| &a[k * CHUNK..k * CHUNK + y.len()]);
+        for (i, (x, y)) in x.iter_mut().zip(&mut *y).enumerate() {
+            f(given.map(|a| a[i]), x, y);
+        }
+        dot_chunk(y, y)
+    };
+    let is_short = y.len() < PARALLEL;
+    let parts = x.chunks_mut(CHUNK).zip(y.chunks_mut(CHUNK)).enumerate();
+    if is_short { parts.map(chunk).sum() } else { parallel::collect(parts, &chunk).into_iter().sum() }
 }
 
 #[cfg(test)]

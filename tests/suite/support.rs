@@ -79,12 +79,15 @@ pub fn assert_refused(text: &str, path: &str, words: &[&str]) {
 }
 
 /// Takes steps, each shortened where it fails.
-pub fn advance<const D: usize, L: Law>(simulation: &mut Simulation<D, L>, steps: usize) -> Result<(), Failure> {
+pub fn advance<const D: usize, L: Law + 'static>(
+    simulation: &mut Simulation<D, L>,
+    steps: usize,
+) -> Result<(), Failure> {
     (0..steps).try_for_each(|_| simulation.advance().map(drop)).map_err(Into::into)
 }
 
 /// Takes steps up to the time `end`.
-pub fn run_to<const D: usize, L: Law>(simulation: &mut Simulation<D, L>, end: f64) -> Result<(), Failure> {
+pub fn run_to<const D: usize, L: Law + 'static>(simulation: &mut Simulation<D, L>, end: f64) -> Result<(), Failure> {
     while simulation.clock.time() < end - 1e-9 {
         simulation.advance()?;
     }

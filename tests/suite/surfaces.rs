@@ -315,9 +315,9 @@ fn a_body_has_the_shape_in_a_file() -> Result<(), Failure> {
         assert!(one.position.iter().zip(&other.position).all(near), "{name}");
         assert!(one.volume.iter().zip(&other.volume).all(|(v, w)| (v - w).abs() < 1e-12));
         // All nodes of the body are held: the surface serves as a region, too.
-        let before = read.particles.position.clone();
+        let before = read.particles.by_id().position;
         read.advance()?;
-        assert_eq!(read.particles.position, before);
+        assert_eq!(read.particles.by_id().position, before);
     }
     let doubled = json!({"scaled": {"of": {"surface": {"file": "cube.stl"}}, "about": [1, 1, 1], "factor": 1.5}});
     let turned = json!({"rotated": {"of": doubled, "about": [2, 2, 2], "angle": 20, "axis": [0, 0, 1]}});

@@ -235,8 +235,7 @@ fn computed<const D: usize>(
     let equilibrium = Equilibrium::new(step, &[]);
     let u = field::<D>(nodes);
     let dphi: Vec<_> = u.iter().map(|u| u * 0.02).collect();
-    let mut gathered = vec![0.0; particles.len()];
-    supports.each_particle(&u, |_, value, gradient| value.sum() + gradient.sum(), |p, sum| gathered[p] = sum);
+    let gathered = supports.evaluate(&u, |_, value, gradient| value.sum() + gradient.sum());
     let mut product = vec![Vector::zeros(); u.len()];
     let tangent = equilibrium.tangent(&dphi)?;
     tangent.product(&u, &mut product);
@@ -253,16 +252,16 @@ fn computed<const D: usize>(
     ])
 }
 
-fn several_waves<const D: usize>(cells: [u32; D]) -> Result<(), Failure> {
+fn many_blocks<const D: usize>(cells: [u32; D]) -> Result<(), Failure> {
     let (grid, particles, bodies) = one_a_cell(cells)?;
     let (shape, at) = (Approximation::from(Linear), &particles.position);
-    let in_waves = |threads: usize| {
+    let with = |threads: usize| {
         in_threads(threads, || {
             let (supports, nodes) = Supports::new(&shape, &grid, at)?;
             computed(&supports, &nodes, &particles, &bodies)
         })
     };
-    let one = in_waves(1)?;
+    let one = with(1)?;
     let (plain, nodes) = Supports::plain(&shape, &grid, at)?;
     for ((name, fast), (_, plain)) in one.iter().zip(computed(&plain, &nodes, &particles, &bodies)?) {
         assert_eq!(fast.len(), plain.len(), "{D}D: {name}");
@@ -271,7 +270,7 @@ fn several_waves<const D: usize>(cells: [u32; D]) -> Result<(), Failure> {
         assert!(close && largest > 0.0, "{D}D: {name} of the plain sweep differ");
     }
     for threads in [2, 5] {
-        for ((name, one), (_, many)) in one.iter().zip(in_waves(threads)?) {
+        for ((name, one), (_, many)) in one.iter().zip(with(threads)?) {
             let same = one.len() == many.len() && one.iter().zip(&many).all(|(a, b)| a.to_bits() == b.to_bits());
             assert!(same, "{D}D: {name} with {threads} threads differ");
         }
@@ -281,9 +280,9 @@ fn several_waves<const D: usize>(cells: [u32; D]) -> Result<(), Failure> {
 
 /// Blocks have 16² or 4³ cells, and a batch (wave) has 64 blocks: here there are 72 and 150 blocks.
 #[test]
-fn several_waves_of_blocks_sum_the_same_bits_and_those_of_the_plain_sweep() -> Result<(), Failure> {
-    several_waves([144, 128])?;
-    several_waves([20, 20, 24])
+fn many_blocks_sum_the_same_bits_and_those_of_the_plain_sweep() -> Result<(), Failure> {
+    many_blocks([144, 128])?;
+    many_blocks([20, 20, 24])
 }
 
 /// Reused memory leaves no trace of the former shape-function values, with other blocks and widths.

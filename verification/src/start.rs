@@ -20,6 +20,6 @@ pub fn velocity_by_masses<const D: usize, L: Law, A: ShapeFunction>(
     particles.velocity = particles.position.iter().map(velocity).collect();
     let (supports, _) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
     let nodal = Nodal::project(particles, &supports, 1.0)?;
-    particles.velocity = supports.values(&nodal.velocity);
+    particles.velocity = supports.values(&nodal.velocity).to_vec();
     Ok(())
 }

@@ -3,10 +3,14 @@
 use crate::grid::{Grid, indices};
 use crate::mechanics::loads::Prescribed;
 use crate::mechanics::sweep::Supports;
+use crate::parallel::{self, PART};
 use crate::particles::Particles;
 use crate::tensor::Vector;
 use std::cell::LazyCell;
 use std::collections::{BTreeSet, HashMap, HashSet};
+
+/// Number of cells in one part of the work of a thread.
+const CELLS: usize = 256;
 
 /// A node belongs to one body if the variance of the body index at that node, relative to its mean square, is below this tolerance.
 const ALONE: f64 = 1e-9;
@@ -26,30 +30,37 @@ pub(crate) fn reached_conditions<const D: usize>(
         let position = grid.position(index);
         prescribed.iter().enumerate().filter(move |(_, one)| one.on.holds(grid, index, &position)).map(|(one, _)| one)
     };
-    let of_cell = |cell: [u32; D], counts: &dyn Fn([u32; D], usize) -> bool| -> BTreeSet<usize> {
-        corners(cell).flat_map(|index| holders(index).filter(move |&one| counts(index, one))).collect()
-    };
+    let of_cell = |cell: [u32; D]| -> BTreeSet<usize> { corners(cell).flat_map(holders).collect() };
     // The conditions that held a node of a cell at the last grid reset, with the nodal field.
     let held = LazyCell::new(|| -> HashSet<(u32, usize)> {
-        let cells = cells(at_reset.iter().enumerate().map(|(p, x)| (x, field(p))), grid).into_iter();
-        let of_cell = |cell: u64| of_cell(grid.index(cell), &|_, _| true);
-        cells.flat_map(|(cell, field)| of_cell(cell).into_iter().map(move |one| (field, one))).collect()
+        let cells = cells(at_reset, &field, grid).into_iter();
+        cells.flat_map(|(cell, field)| of_cell(grid.index(cell)).into_iter().map(move |one| (field, one))).collect()
     });
-    // The conditions that are new to a cell, by cell and field.
-    let of_field = |key: (u64, u32)| {
-        let (cell, field) = key;
+    // The conditions of a cell, and whether a node there is not active yet.
+    let conditions = |&(cell, field): &(u64, u32)| -> Vec<(usize, bool)> {
         mutant!("reference: nodes of the first field hold all bodies": field = 0);
-        let is_new = |index, one| nodes.number(grid.id_in(field, index)).is_none() || !held.contains(&(field, one));
-        (key, of_cell(grid.index(cell), &is_new))
+        let is_new = |index| nodes.number(grid.id_in(field, index)).is_none();
+        corners(grid.index(cell)).flat_map(|index| holders(index).map(move |one| (one, is_new(index)))).collect()
     };
-    let new = cells(present.iter().enumerate().map(|(p, x)| (x, field(p))), grid).into_iter();
-    let new: HashMap<(u64, u32), _> = new.map(of_field).collect();
+    let keys = cells(present, &field, grid);
+    let of_part = |part: &[(u64, u32)]| -> Vec<_> {
+        part.iter().map(|key| (*key, conditions(key))).filter(|(_, all)| !all.is_empty()).collect()
+    };
+    let all = parallel::collect(keys.chunks(CELLS), &of_part).into_iter().flatten();
+    // The conditions that are new to a cell, by cell and field.
+    let new = all.map(|(key, conditions)| -> ((u64, u32), BTreeSet<usize>) {
+        let is_new = |&(one, is_free): &(usize, bool)| is_free || !held.contains(&(key.1, one));
+        (key, conditions.into_iter().filter(is_new).map(|(one, _)| one).collect())
+    });
+    let new: HashMap<(u64, u32), _> = new.filter(|(_, met)| !met.is_empty()).collect();
     mutant!("reference: no wall that is met resets the grid": { return BTreeSet::new(); });
     let mut reached = BTreeSet::new();
+    if new.is_empty() {
+        return reached;
+    }
     for (p, (x, before)) in present.iter().zip(at_reset).enumerate() {
-        let met = grid.cell(x).and_then(|cell| new.get(&(grid.id(cell), field(p)))).filter(|met| !met.is_empty());
-        let Some(met) = met else { continue };
-        let were_there = grid.cell(before).map_or_else(BTreeSet::new, |cell| of_cell(cell, &|_, _| true));
+        let Some(met) = grid.cell(x).and_then(|cell| new.get(&(grid.id(cell), field(p)))) else { continue };
+        let were_there = grid.cell(before).map_or_else(BTreeSet::new, of_cell);
         reached.extend(met.difference(&were_there));
     }
     reached
@@ -88,7 +99,7 @@ fn pair(one: u32, other: u32) -> [u32; 2] {
 /// The bodies in the cells around each node.
 fn seen<const D: usize>(position: &[Vector<f64, D>], body: &[u32], grid: &Grid<D>) -> HashMap<u64, BTreeSet<u32>> {
     let mut seen: HashMap<u64, BTreeSet<u32>> = HashMap::new();
-    for (cell, body) in cells(position.iter().zip(body.iter().copied()), grid) {
+    for (cell, body) in cells(position, &|p| body[p], grid) {
         for index in corners(grid.index(cell)) {
             seen.entry(grid.id(index)).or_default().insert(body);
         }
@@ -128,11 +139,19 @@ pub(crate) fn touch<const D: usize>(particles: &Particles<D>, supports: &Support
 }
 
 /// The pairs of a cell's id and an item in that cell, sorted, each pair once.
-fn cells<'a, const D: usize, T: Ord>(
-    held: impl Iterator<Item = (&'a Vector<f64, D>, T)>,
+fn cells<const D: usize, T: Ord + Send>(
+    position: &[Vector<f64, D>],
+    item: &(dyn Fn(usize) -> T + Sync),
     grid: &Grid<D>,
 ) -> Vec<(u64, T)> {
-    let mut cells: Vec<_> = held.filter_map(|(x, what)| Some((grid.id(grid.cell(x)?), what))).collect();
+    let of_part = |part: usize| {
+        let own = position.iter().enumerate().skip(part * PART).take(PART);
+        let mut cells: Vec<_> = own.filter_map(|(p, x)| Some((grid.id(grid.cell(x)?), item(p)))).collect();
+        // Particles of a cell follow each other.
+        cells.dedup();
+        cells
+    };
+    let mut cells: Vec<_> = parallel::map(position.len().div_ceil(PART), &of_part).into_iter().flatten().collect();
     cells.sort_unstable();
     cells.dedup();
     cells

@@ -57,6 +57,11 @@ impl Block {
         self.windows.len()
     }
 
+    /// Number of particles.
+    pub(super) fn count(&self) -> usize {
+        self.windows.iter().map(|group| usize::from(group.lanes)).sum()
+    }
+
     #[inline(always)]
     pub(super) fn group(&self, group: usize) -> Group<'_> {
         let lanes = usize::from(self.windows[group].lanes);

@@ -16,7 +16,7 @@
 //! Derivatives therefore go through the production kernels.
 //!
 //! `plain.rs` is this loop, and serves shape functions that are not products. For products N = Π_k N_k, `tiled.rs` has the shape functions
-//! of each axis, and `waves.rs` runs the loop over them on all cores. Both agree to round-off. The words:
+//! of each axis, and `regions.rs` runs the loop over them on all cores. Both agree to round-off. The words:
 //!
 //! - A *lane* is one slot of a vector of eight numbers, and holds one particle.
 //! - A *group* is a batch of up to eight particles that share a window of nodes. They lie in one cell, or in neighbours along x.
@@ -26,6 +26,7 @@
 //!
 //! Threads are used here and in the vectors of the solver.
 
+mod at_particle;
 mod block;
 mod blocks;
 mod builder;
@@ -38,10 +39,11 @@ mod order;
 mod passes;
 mod plain;
 mod points;
+mod regions;
 mod supports;
 mod tiled;
-mod waves;
 
+pub use at_particle::AtParticle;
 pub use block::Group;
 pub use blocks::Quadratic;
 pub(crate) use blocks::pair;
@@ -58,8 +60,8 @@ use crate::lanes::LANES;
 /// `(group, u and L, q and σ)` of every field: adds to q and σ, which begin with zero. A pass makes this function once.
 type Point<'a, const C: usize, const D: usize> = dyn Fn(Group<'_>, &[At<f64, C, D>], &mut [At<f64, C, D>]) + Sync + 'a;
 
-/// `(group, u and L of every field)`: the result of the group.
-type Evaluate<'a, R, const C: usize, const D: usize> = dyn Fn(Group<'_>, &[At<f64, C, D>]) -> R + Sync + 'a;
+/// `(group, u and L of every field, results)`: writes the results of the group's particles.
+type Evaluate<'a, R, const C: usize, const D: usize> = dyn Fn(Group<'_>, &[At<f64, C, D>], &mut [R]) + Sync + 'a;
 
 /// `(group, u and L, rows)`: fills the rows of a group.
 type Fill<'a, const D: usize> = dyn Fn(Group<'_>, &At<f64, D, D>, &mut [[f64; LANES]]) + Sync + 'a;

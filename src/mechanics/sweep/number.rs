@@ -1,5 +1,6 @@
 //! The number types of nodal fields. Gather and scatter are linear, so a dual number is two fields of plain numbers.
 
+use super::at_particle::AtParticle;
 use super::kernel::At;
 use crate::scalar::Real;
 use crate::tensor::Vector;
@@ -8,7 +9,7 @@ use std::array::from_fn;
 use std::borrow::Cow;
 
 /// A number made of one or more plain numbers. Each of them is a field of its own in the kernels.
-pub trait Number: Real + Send + Sync + 'static {
+pub trait Number: Real + AtParticle + Send + Sync + 'static {
     /// Number of plain numbers in it.
     const FIELDS: usize;
 

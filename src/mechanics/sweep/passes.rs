@@ -2,9 +2,10 @@
 
 use super::kernel::At;
 use super::supports::{Way, either};
-use super::{Group, Mode, Number, Quadratic, Supports, Weights};
+use super::{AtParticle, Group, Mode, Number, Quadratic, Supports, Weights};
 use crate::lanes::LANES;
 use crate::parallel::First;
+use crate::pooled::{Element, Pooled};
 use crate::tensor::{Tensor, Vector};
 use std::convert::Infallible;
 
@@ -154,36 +155,28 @@ impl<const D: usize> Supports<D> {
     }
 
     /// Σ u_I N_I at every particle.
-    pub fn values<const C: usize>(&self, field: &[Vector<f64, C>]) -> Vec<Vector<f64, C>> {
-        let mut values = vec![Vector::zeros(); self.particles()];
-        self.each_value(field, |p, value| values[p] = value);
+    ///
+    /// Example: [`Supports`].
+    pub fn values<const C: usize>(&self, field: &[Vector<f64, C>]) -> Pooled<Vector<f64, C>>
+    where
+        Vector<f64, C>: Element,
+    {
+        const { assert!(C == 1 || C == D) };
+        let point = |_: usize, at: &[At<f64, C, D>], lane: usize| Vector::from_fn(|c, _| at[0].value[c][lane]);
+        let mut values = self.pool().unspecified(self.particles(), Vector::zeros());
+        self.at_particles(1, bytemuck::cast_slice(field), Mode::VALUE, &mut values, point);
         values
     }
 
-    /// Calls `take(p, Σ u_I N_I)` for every particle, in an order that does not depend on the number of threads.
-    ///
-    /// ```
-    /// use bfree::mechanics::{check::direction, sweep::Supports};
-    ///
-    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
-    /// let simulation = scene.build::<2>("scenes".as_ref())?;
-    /// let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &simulation.particles.position)?;
-    /// let field = direction::<2>(nodes.len(), 1);
-    /// let (values, mut visited) = (supports.values(&field), 0);
-    /// supports.each_value(&field, |p, value| {
-    ///     assert_eq!(value, values[p]);
-    ///     visited += 1;
-    /// });
-    /// assert_eq!(visited, values.len());
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    pub fn each_value<const C: usize>(&self, field: &[Vector<f64, C>], take: impl FnMut(usize, Vector<f64, C>)) {
-        const { assert!(C == 1 || C == D) };
-        let point = |_: usize, at: &[At<f64, C, D>], lane: usize| Vector::from_fn(|c, _| at[0].value[c][lane]);
-        self.each(1, bytemuck::cast_slice(field), Mode::VALUE, point, take);
+    /// Σ u_I ⊗ ∇_r N_I at every particle.
+    pub(crate) fn gradients(&self, field: &[Vector<f64, D>]) -> Pooled<Tensor<f64, D>> {
+        let point = |_: usize, at: &[At<f64, D, D>], lane: usize| Tensor::from_fn(|c, k| at[0].gradient[c][k][lane]);
+        let mut gradients = self.pool().unspecified(self.particles(), Tensor::zeros());
+        self.at_particles(1, bytemuck::cast_slice(field), Mode::GRADIENT, &mut gradients, point);
+        gradients
     }
 
-    /// Calls `take(p, point(p, u_p, ∇u_p))` for every particle, in an order that does not depend on the number of threads.
+    /// `point(p, u_p, ∇u_p)` of every particle.
     ///
     /// ```
     /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
@@ -192,46 +185,45 @@ impl<const D: usize> Supports<D> {
     /// let (supports, nodes) = bfree::mechanics::sweep::Supports::new(&simulation.approximation, grid, &particles.position)?;
     /// // A rotation about the origin, u = ω × x, has no divergence.
     /// let rotation: Vec<_> = nodes.positions(grid).map(|(_, x)| bfree::tensor::Vector::from([-x[1], x[0]])).collect();
-    /// let mut visited = vec![false; particles.len()];
-    /// supports.each_particle(&rotation, |_, _, gradient| gradient.trace(), |p, divergence| {
-    ///     assert!(divergence.abs() < 1e-12);
-    ///     visited[p] = true;
-    /// });
-    /// assert!(visited.iter().all(|&once| once));
+    /// let divergence = supports.evaluate(&rotation, |_, _, gradient| gradient.trace());
+    /// assert_eq!(divergence.len(), particles.len());
+    /// assert!(divergence.iter().all(|one| one.abs() < 1e-12));
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn each_particle<T: Number, R: Send>(
+    pub fn evaluate<T: Number, R: AtParticle>(
         &self,
         field: &[Vector<T, D>],
         point: impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> R + Sync,
-        take: impl FnMut(usize, R),
-    ) {
+    ) -> Vec<R> {
         let point = |p: usize, fields: &[At<f64, D, D>], lane: usize| {
             let value = Vector::from_fn(|c, _| T::from_fields(|i| fields[i].value[c][lane]));
             let gradient = Tensor::from_fn(|c, k| T::from_fields(|i| fields[i].gradient[c][k][lane]));
             point(p, value, gradient)
         };
-        self.each(T::FIELDS, &T::flat(field), Mode::BOTH, point, take);
+        let mut results = vec![R::blank(); self.particles()];
+        self.at_particles(T::FIELDS, &T::flat(field), Mode::BOTH, &mut results, point);
+        results
     }
 
-    /// Calls `take(p, point(p, u and L of every field, lane))` for every particle in the order of the groups.
-    fn each<R: Send, const C: usize>(
+    /// Writes `point(p, u and L of every field, lane)` of every particle, in memory order.
+    fn at_particles<R: AtParticle, const C: usize>(
         &self,
         fields: usize,
         field: &[f64],
         mode: Mode,
+        results: &mut [R],
         point: impl Fn(usize, &[At<f64, C, D>], usize) -> R + Sync,
-        mut take: impl FnMut(usize, R),
     ) {
         self.pass();
-        let evaluate = |group: Group<'_>, at: &[At<f64, C, D>]| -> [Option<R>; LANES] {
-            std::array::from_fn(|lane| Some(point(*group.particles.get(lane)? as usize, at, lane)))
+        let evaluate = |group: Group<'_>, at: &[At<f64, C, D>], results: &mut [R]| {
+            for (lane, (&p, result)) in group.particles.iter().zip(results).enumerate() {
+                *result = point(p as usize, at, lane);
+            }
         };
-        let mut take = |group: Group<'_>, results: [Option<R>; LANES]| {
-            let results = results.into_iter().flatten();
-            group.particles.iter().zip(results).for_each(|(&p, result)| take(p as usize, result));
-        };
-        either!(self, way => way.gather(fields, field, mode, &evaluate, &mut take));
+        either!(self, way => way.gather(fields, field, mode, &evaluate, results));
+        if let Way::Tiled(tiled) = &self.way {
+            tiled.to_memory_order(results);
+        }
     }
 
     /// `point(p, u_p, ∇u_p)` of every particle, in the order of the particles in memory.
@@ -240,18 +232,19 @@ impl<const D: usize> Supports<D> {
     ///
     /// # Errors
     /// The error of the first particle in memory whose `point` fails.
-    pub fn interpolate<T: Number, R: Send, E: Send>(
+    pub fn interpolate<T: Number, R: AtParticle, E: Send>(
         &self,
         field: &[Vector<T, D>],
         point: impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> Result<R, E> + Sync,
     ) -> Result<Vec<R>, E> {
-        let mut results: Vec<Option<R>> = (0..self.particles()).map(|_| None).collect();
         let failure = First::none();
-        self.each_particle(field, point, |p, result| match result {
-            Ok(result) => results[p] = Some(result),
-            Err(error) => failure.keep(p, error),
+        let results = self.evaluate(field, |p, value, gradient| {
+            point(p, value, gradient).unwrap_or_else(|error| {
+                failure.keep(p, error);
+                R::blank()
+            })
         });
         failure.check()?;
-        Ok(results.into_iter().flatten().collect())
+        Ok(results)
     }
 }

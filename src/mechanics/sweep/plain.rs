@@ -144,34 +144,34 @@ impl<const D: usize> Plain<D> {
         });
     }
 
-    /// Calls `take(group, evaluate(group, u and L))` for every group in order.
+    /// Calls `evaluate(group, u and L, results)` for every group, with the results of its particles.
     pub(super) fn gather<R: Send, const C: usize>(
         &self,
         fields: usize,
         field: &[f64],
         _: Mode,
         evaluate: &Evaluate<'_, R, C, D>,
-        take: &mut dyn FnMut(Group<'_>, R),
+        results: &mut [R],
     ) {
-        self.in_order(|group| evaluate(group, &self.gathered(group, fields, field)), take);
+        self.write(LANES, results, &|group, results| evaluate(group, &self.gathered(group, fields, field), results));
     }
 
-    /// Calls `take(group, evaluate(group))` for every group in order.
-    pub(super) fn map_groups<R: Send>(
-        &self,
-        evaluate: &(dyn Fn(Group<'_>) -> R + Sync),
-        take: &mut dyn FnMut(Group<'_>, R),
-    ) {
-        self.in_order(evaluate, take);
+    /// Writes `evaluate(group)` of every group, in the order of their numbers.
+    pub(super) fn map_groups<R: Send>(&self, evaluate: &(dyn Fn(Group<'_>) -> R + Sync), results: &mut [R]) {
+        self.write(1, results, &|group, results| results[0] = evaluate(group));
     }
 
     pub(super) fn fill_rows(&self, field: &[f64], count: usize, rows: &mut [[f64; LANES]], fill: &Fill<'_, D>) {
-        let evaluate = |group: Group<'_>| {
-            let mut rows = vec![[0.0; LANES]; count];
-            fill(group, &self.gathered(group, 1, field)[0], &mut rows);
-            rows
-        };
-        self.in_order(evaluate, |group, filled| rows[group.number * count..][..count].copy_from_slice(&filled));
+        self.write(count, rows, &|group, rows| fill(group, &self.gathered(group, 1, field)[0], rows));
+    }
+
+    /// Calls `write` for every group with its `count` results.
+    fn write<R: Send>(&self, count: usize, results: &mut [R], write: &(dyn Fn(Group<'_>, &mut [R]) + Sync)) {
+        let tasks = results.chunks_mut(TASK * count).enumerate();
+        parallel::for_each(tasks, &|(task, results): (usize, &mut [R])| {
+            let groups = results.chunks_mut(count).enumerate();
+            groups.for_each(|(group, results)| write(self.group(task * TASK + group), results));
+        });
     }
 
     /// u = Σ u_I N_I and L = Σ u_I ⊗ ∇_r N_I of every field at the particles of a group.

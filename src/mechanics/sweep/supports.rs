@@ -15,9 +15,6 @@ use crate::tensor::{Tensor, Vector};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Passes leap too often in memory if more than one in so many particles does not directly follow the particle before it.
-const LEAPS: usize = 8;
-
 /// The shape-function values and the connectivity of all particles at the last grid reset, and the active nodes.
 ///
 /// ```
@@ -129,7 +126,7 @@ impl<const D: usize> Supports<D> {
                     Way::Plain(_) => None,
                     Way::Tiled(tiled) => Some(tiled),
                 });
-                let (tiled, nodes) = Tiled::new(approximation, product, grid, points, spare)?;
+                let (tiled, nodes) = Tiled::new(approximation, product, grid, points, spare, pool)?;
                 Ok((Self::of_way(Way::Tiled(tiled), grid, &nodes, pool).with_fields(points), nodes))
             }
             _ => {
@@ -201,8 +198,7 @@ impl<const D: usize> Supports<D> {
         &self.pool
     }
 
-    /// The order in which passes take the particles, if it leaps too often in memory. A particle leaps if it does not directly follow
-    /// the particle before it. More than one leap in eight particles is too often.
+    /// The order in which passes take the particles: by block, cell and id. `None` if the particles lie in memory in this order.
     ///
     /// ```
     /// use bfree::mechanics::sweep::Supports;
@@ -214,24 +210,21 @@ impl<const D: usize> Supports<D> {
     /// let backwards: Vec<u32> = (0..particles.len() as u32).rev().collect();
     /// particles.rearrange(&backwards);
     /// let (supports, _) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
-    /// particles.rearrange(&supports.leaping().ok_or("backwards")?);
+    /// particles.rearrange(&supports.block_order().ok_or("backwards")?);
     /// let (supports, _) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
-    /// assert_eq!(supports.leaping(), None);
+    /// assert_eq!(supports.block_order(), None);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn leaping(&self) -> Option<Vec<u32>> {
+    pub fn block_order(&self) -> Option<Vec<u32>> {
         let Way::Tiled(tiled) = &self.way else { return None };
-        let mut next = 0;
-        let leaps = tiled.order().filter(|&p| std::mem::replace(&mut next, p + 1) != p).count();
-        (leaps > tiled.particles() / LEAPS).then(|| tiled.order().collect())
+        (!tiled.is_memory_order).then(|| tiled.order().collect())
     }
 
-    /// These supports after the particles have been put in the order of [`Self::leaping`].
-    pub(crate) fn rearranged(mut self) -> Self {
+    /// Renumbers the particles after they have been put into [`Self::block_order`].
+    pub(crate) fn rearrange(&mut self) {
         if let Way::Tiled(tiled) = &mut self.way {
             tiled.rearrange();
         }
-        self
     }
 
     /// These supports with the number of passes set to zero.
@@ -295,13 +288,11 @@ impl<const D: usize> Supports<D> {
         either!(self, way => way.each_group(&mut visit));
     }
 
-    /// Calls `take(group, evaluate(group))` for all groups, in the order of their numbers.
-    pub(crate) fn map_groups<R: Send>(
-        &self,
-        evaluate: impl Fn(Group<'_>) -> R + Sync,
-        mut take: impl FnMut(Group<'_>, R),
-    ) {
-        either!(self, way => way.map_groups(&evaluate, &mut take));
+    /// `evaluate(group)` of all groups, in the order of their numbers.
+    pub(crate) fn map_groups<R: Clone + Default + Send>(&self, evaluate: impl Fn(Group<'_>) -> R + Sync) -> Vec<R> {
+        let mut results = vec![R::default(); self.groups()];
+        either!(self, way => way.map_groups(&evaluate, &mut results));
+        results
     }
 
     /// Number of groups.
@@ -325,6 +316,14 @@ impl<const D: usize> Supports<D> {
     /// Example: [`Self::plain`].
     pub fn bytes(&self) -> usize {
         either!(self, way => way.bytes())
+    }
+
+    /// Bytes of the boxes into which all blocks scatter at the same time. With one thread, the blocks share a box.
+    pub(crate) fn box_bytes(&self) -> usize {
+        match &self.way {
+            Way::Plain(_) => 0,
+            Way::Tiled(tiled) => tiled.box_bytes(),
+        }
     }
 
     /// The entries (active node, N, ∇_r N) of one particle.

@@ -8,22 +8,30 @@ use super::builder::{Builder, Row, number};
 use super::columns::Family;
 use super::order::{self, Key};
 use super::points::{Points, SupportError};
+use super::regions::RANGE;
 use crate::approximation::{ApproximationError, Scratch, Separable, ShapeFunction, Support};
 use crate::grid::Grid;
 use crate::lanes::LANES;
 use crate::nodes::Nodes;
 use crate::parallel;
 use crate::parallel::First;
+use crate::pooled::Pool;
 use crate::tensor::Vector;
 
 /// The shape functions of all particles, by axis.
 #[derive(Debug, Default)]
 pub(super) struct Tiled<const D: usize> {
     pub(super) blocks: Vec<Block>,
+    /// For each range of nodes, the blocks with a node in it, ascending.
+    pub(super) ranges: Vec<Vec<u32>>,
+    /// Memory pool of the blocks' boxes.
+    pub(super) pool: Pool,
     /// Slot of each particle: group · 8 + lane.
     slots: Vec<u32>,
     /// The particles in their order.
     keys: Vec<Key>,
+    /// Whether the particles lie in memory in this order.
+    pub(super) is_memory_order: bool,
     /// Rows and nodes of the last numbering, whose memory the next step reuses.
     rows: Vec<Row>,
     nodes: Nodes,
@@ -37,6 +45,7 @@ impl<const D: usize> Tiled<D> {
         grid: &Grid<D>,
         points: &Points<'_, D>,
         spare: Option<Self>,
+        pool: &Pool,
     ) -> Result<(Self, Nodes), SupportError> {
         let positions = &*points.positions;
         // Threads meet errors in any order. So the particle with the smallest id is searched, with the error for its whole position.
@@ -47,7 +56,7 @@ impl<const D: usize> Tiled<D> {
             let (particle, source) = failing.min_by_key(|&(id, _)| id).unwrap_or((points.id(particle), source));
             SupportError { particle, source }
         };
-        let Self { mut blocks, mut slots, keys, mut rows, nodes } = spare.unwrap_or_default();
+        let Self { mut blocks, mut ranges, slots, keys, mut rows, nodes, .. } = spare.unwrap_or_default();
         let keys = order::sorted(grid, points, keys).map_err(|particle| {
             let outside = ApproximationError::Outside { position: Vec::new(), lower: Vec::new(), upper: Vec::new() };
             failure(particle, outside)
@@ -67,15 +76,12 @@ impl<const D: usize> Tiled<D> {
             first += block.len();
         }
         let nodes = number(grid, &mut blocks, &mut rows, nodes.into_spare());
-        slots.resize(positions.len(), 0);
-        for block in &blocks {
-            for group in (0..block.len()).map(|group| block.group(group)) {
-                for (lane, &p) in group.particles.iter().enumerate() {
-                    slots[p as usize] = (group.number * LANES + lane) as u32;
-                }
-            }
-        }
-        Ok((Self { blocks, slots, keys, rows, nodes: nodes.clone() }, nodes))
+        list_blocks(&blocks, nodes.len(), &mut ranges);
+        let is_memory_order = keys.iter().zip(0..).all(|(key, place)| key.particle == place);
+        let (pool, numbered) = (pool.clone(), nodes.clone());
+        let mut tiled = Self { blocks, ranges, pool, slots, keys, is_memory_order, rows, nodes: numbered };
+        tiled.find_slots();
+        Ok((tiled, nodes))
     }
 
     pub(super) fn particles(&self) -> usize {
@@ -87,9 +93,39 @@ impl<const D: usize> Tiled<D> {
         self.keys.iter().map(|key| key.particle)
     }
 
-    /// Renumbers the particles as if they lay in memory in [`Self::order`]. The next step sorts from there.
+    /// Moves results from [`Self::order`] to the order of the particles in memory.
+    pub(super) fn to_memory_order<R: Copy>(&self, results: &mut [R]) {
+        if !self.is_memory_order {
+            let unsorted = results.to_vec();
+            self.order().zip(unsorted).for_each(|(p, result)| results[p as usize] = result);
+        }
+    }
+
+    /// Renumbers the particles after they have been put into [`Self::order`].
     pub(super) fn rearrange(&mut self) {
         self.keys.iter_mut().zip(0..).for_each(|(key, place)| key.particle = place);
+        self.is_memory_order = true;
+        let mut next = 0;
+        for block in &mut self.blocks {
+            for (particles, window) in block.particles.iter_mut().zip(&block.windows) {
+                let lanes = u32::from(window.lanes);
+                particles.iter_mut().zip(next..next + lanes).for_each(|(particle, place)| *particle = place);
+                next += lanes;
+            }
+        }
+        self.find_slots();
+    }
+
+    /// Finds the slot of each particle.
+    fn find_slots(&mut self) {
+        self.slots.resize(self.keys.len(), 0);
+        for block in &self.blocks {
+            for group in (0..block.len()).map(|group| block.group(group)) {
+                for (lane, &p) in group.particles.iter().enumerate() {
+                    self.slots[p as usize] = (group.number * LANES + lane) as u32;
+                }
+            }
+        }
     }
 
     pub(super) fn each_group(&self, visit: &mut dyn FnMut(Group<'_>)) {
@@ -108,7 +144,8 @@ impl<const D: usize> Tiled<D> {
     }
 
     pub(super) fn bytes(&self) -> usize {
-        size_of_val(self.slots.as_slice()) + self.blocks.iter().map(Block::bytes).sum::<usize>()
+        let ranges = self.ranges.iter().map(|blocks| size_of_val(blocks.as_slice())).sum::<usize>();
+        size_of_val(self.slots.as_slice()) + ranges + self.blocks.iter().map(Block::bytes).sum::<usize>()
     }
 
     pub(super) fn of(&self, particle: usize) -> Vec<(usize, f64, Vector<f64, D>)> {
@@ -120,5 +157,16 @@ impl<const D: usize> Tiled<D> {
             Some((block.nodes[at] as usize, n, grad_n))
         };
         block.entries::<D>(group - block.first, lane).filter_map(active).collect()
+    }
+}
+
+/// Lists the blocks of each range of nodes. The memory of `ranges` is reused.
+fn list_blocks(blocks: &[Block], nodes: usize, ranges: &mut Vec<Vec<u32>>) {
+    ranges.resize_with(nodes.div_ceil(RANGE), Vec::new);
+    ranges.iter_mut().for_each(Vec::clear);
+    for (block, number) in blocks.iter().zip(0..) {
+        for same in block.nodes.chunk_by(|&a, &b| a as usize / RANGE == b as usize / RANGE) {
+            ranges[same[0] as usize / RANGE].push(number);
+        }
     }
 }

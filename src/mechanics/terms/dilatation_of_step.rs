@@ -125,12 +125,10 @@ impl<'a, const D: usize, L: Law> DilatationOfStep<'a, D, L> {
 
     fn means<T: Number>(&self, dphi: &[Vector<T, D>]) -> Vec<Mean<T>> {
         let Step { particles, supports, .. } = self.step;
-        let mut grown = vec![T::zero(); particles.len()];
-        let growth = |p: usize, g: &Tensor<T, D>| {
-            let [before, after] = self.ends(p, g).ends.map(|at| at.j);
+        let grown = supports.evaluate(dphi, |p, _, g| {
+            let [before, after] = self.ends(p, &g).ends.map(|at| at.j);
             (after - before) * T::lit(particles.volume[p])
-        };
-        supports.each_particle(dphi, |p, _, g| growth(p, &g), |p, more| grown[p] = more);
+        });
         let mean = |((members, volume), &before): ((&[Member], f64), &f64)| {
             let growth = members.iter().fold(T::zero(), |sum, member| sum + grown[member.particle as usize]);
             self.mean(members, volume, before, growth)

@@ -9,6 +9,7 @@ use crate::mechanics::schemes::Alphas;
 use crate::mechanics::sweep::{Mode, Number};
 use crate::mechanics::transfer::Nodal;
 use crate::mechanics::trial::Trial;
+use crate::parallel::{self, PART};
 use crate::pooled::Pooled;
 use crate::tensor::{Tensor, Vector, identity, scaled};
 
@@ -30,8 +31,7 @@ impl<'a, const D: usize> Inertia<'a, D> {
         let mut predicted = Pooled::default();
         if mass.lumping < 1.0 {
             let of_nodes = mass.supports.pool().collect(nodal.predicted(&alphas));
-            predicted = mass.supports.pool().filled(mass.particles.len(), Vector::zeros());
-            mass.supports.each_value(&of_nodes, |p, value| predicted[p] = value);
+            predicted = mass.supports.values(&of_nodes);
         }
         Some(Self { mass, nodal, alphas, predicted })
     }
@@ -80,10 +80,9 @@ impl<const D: usize> Term<D> for Inertia<'_, D> {
                 let u = u - self.predicted[p].map(T::lit);
                 half_a1 * T::lit(self.mass.consistent(p)) * u.dot(&u)
             };
-            self.mass.supports.each_particle(dphi, energy, |_, energy| {
-                sum += energy;
-                magnitude += energy.value().abs();
-            });
+            let of_particles = summed(self.mass.supports.evaluate(dphi, energy));
+            sum += of_particles.0;
+            magnitude += of_particles.1;
         }
         Some(Ok((sum, magnitude)))
     }
@@ -110,9 +109,12 @@ pub(super) struct LinearizedMass<'a, const D: usize> {
 
 impl<const D: usize> Linearized<D> for LinearizedMass<'_, D> {
     fn add_product_at_nodes(&self, u: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
-        for ((out, u), m) in out.iter_mut().zip(u).zip(self.mass.lumped) {
-            *out += u * (self.factor * self.mass.lumping * m);
-        }
+        let factor = self.factor * self.mass.lumping;
+        parallel::for_each(out.chunks_mut(PART).enumerate(), &|(part, out): (usize, &mut [Vector<f64, D>])| {
+            for (node, out) in (part * PART..).zip(out) {
+                *out += u[node] * (factor * self.mass.lumped[node]);
+            }
+        });
     }
 
     fn product_at_points(&self, _: Along<'_, D>) -> Option<(Mode, ProductAtPoints<'_, D>)> {

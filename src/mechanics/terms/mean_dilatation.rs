@@ -213,17 +213,12 @@ impl<const D: usize, L: Law> Term<D> for MeanDilatation<'_, D, L> {
     fn energy<T: Number>(&self, dphi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>> {
         let Step { particles, supports, .. } = self.step;
         let states = self.states(Trial::motion(dphi));
-        let mut energies = vec![[T::zero(); 2]; particles.len()];
-        supports.each_particle(
-            dphi,
-            |p, _, g| {
-                let Some(cell) = self.cells.cell(p as u32) else { return [T::zero(); 2] };
-                let volume = T::lit(particles.volume[p]);
-                let (mean, own) = (at_mean(&self.step, p, states[cell].change), self.local(p, &g).response);
-                [mean.energy * volume, -own.energy * volume]
-            },
-            |p, both| energies[p] = both,
-        );
+        let energies = supports.evaluate(dphi, |p, _, g| {
+            let Some(cell) = self.cells.cell(p as u32) else { return [T::zero(); 2] };
+            let volume = T::lit(particles.volume[p]);
+            let (mean, own) = (at_mean(&self.step, p, states[cell].change), self.local(p, &g).response);
+            [mean.energy * volume, -own.energy * volume]
+        });
         Some(Ok(summed(energies.into_iter().flatten())))
     }
 

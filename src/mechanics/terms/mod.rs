@@ -22,7 +22,7 @@ mod term;
 
 pub(crate) use contact::{ContactForce, penalties};
 pub(crate) use planned::planned;
-pub(crate) use term::{Along, Linearized, MixedCell, MixedCells};
+pub(crate) use term::{Along, Linearized, MixedCell, MixedCells, ProductAtPoints};
 pub use term::{AtPoints, Piece, Role, Step, Sum};
 
 use damping::Damping;

@@ -11,11 +11,13 @@ use crate::mechanics::smoothing::Smoothing;
 use crate::mechanics::sweep::Supports;
 use crate::mechanics::trial::Trial;
 use crate::mechanics::unknowns::Unknowns;
+use crate::parallel::{self, First, PART};
 use crate::particles::{Body, Particles};
 use crate::pooled::{Pool, Pooled};
 use crate::tensor::{Tensor, Vector};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::cell::OnceCell;
 
 /// The changes of velocity and acceleration that prescribed nodes give to the particles in the update.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
@@ -79,6 +81,9 @@ pub struct Update<'a, const D: usize> {
     smoothed: Option<[Pooled<Vector<f64, D>>; 2]>,
     /// The internal variables at the end of the step, by particle.
     memory: Option<Vec<f64>>,
+    /// Δx and ∇_r φ of the particles, evaluated once.
+    moved: OnceCell<Pooled<Vector<f64, D>>>,
+    gradients: OnceCell<Pooled<Tensor<f64, D>>>,
 }
 
 impl<'a, const D: usize> Update<'a, D> {
@@ -124,7 +129,19 @@ impl<'a, const D: usize> Update<'a, D> {
             mutant!("transfer: the end of a step forgets the motion on a kept grid": { kept = Some(nodal.motion.pool().collect(dphi.iter().copied())); });
         }
         let (dilatation, smoothed, memory) = (Vec::new(), None, None);
-        Self { dphi, kept, dilatation, delta_velocity, delta_acceleration, impulses, smoothed, memory }
+        let (moved, gradients) = (OnceCell::new(), OnceCell::new());
+        Self {
+            dphi,
+            kept,
+            dilatation,
+            delta_velocity,
+            delta_acceleration,
+            impulses,
+            smoothed,
+            memory,
+            moved,
+            gradients,
+        }
     }
 
     /// The update with dilatations of averaged cells that are unknowns of their own.
@@ -182,7 +199,8 @@ impl<'a, const D: usize> Update<'a, D> {
         let mass = &particles.mass;
         let mut squares = 0.0;
         if !self.delta_acceleration.is_empty() {
-            supports.each_value(&self.delta_acceleration, |p, a| squares += mass[p] * a.norm_squared());
+            let changes = supports.values(&self.delta_acceleration);
+            squares = mass.iter().zip(&*changes).map(|(m, a)| m * a.norm_squared()).sum();
         }
         constant.abs() * dt * dt * (squares / mass.iter().sum::<f64>()).sqrt()
     }
@@ -235,6 +253,16 @@ impl<'a, const D: usize> Update<'a, D> {
         self.dphi.iter().map(|dphi| dphi / dt).collect()
     }
 
+    /// Δx of every particle since the last grid reset.
+    fn moved(&self, supports: &Supports<D>) -> &[Vector<f64, D>] {
+        self.moved.get_or_init(|| supports.values(self.motion()))
+    }
+
+    /// ∇_r φ of every particle.
+    fn gradients(&self, supports: &Supports<D>) -> &[Tensor<f64, D>] {
+        self.gradients.get_or_init(|| supports.gradients(self.motion()))
+    }
+
     /// The particle with the smallest id of those that would leave the grid: its id, and its position outside.
     pub fn leaving(
         &self,
@@ -242,15 +270,14 @@ impl<'a, const D: usize> Update<'a, D> {
         supports: &Supports<D>,
         grid: &Grid<D>,
     ) -> Option<(usize, Vector<f64, D>)> {
-        let mut first: Option<(usize, Vector<f64, D>)> = None;
         let position = particles.reference().position;
-        supports.each_value(self.motion(), |p, delta_x| {
-            let (id, x) = (particles.id[p] as usize, position[p] + delta_x);
-            if !grid.contains(&x) && first.is_none_or(|(one, _)| id < one) {
-                first = Some((id, x));
-            }
+        let moved = self.moved(supports);
+        let first = parallel::map(moved.len().div_ceil(PART), &|part| {
+            let own = part * PART..moved.len().min((part + 1) * PART);
+            let ends = own.map(|p| (particles.id[p] as usize, position[p] + moved[p]));
+            ends.filter(|(_, x)| !grid.contains(x)).min_by_key(|(id, _)| *id)
         });
-        first
+        first.into_iter().flatten().min_by_key(|(id, _)| *id)
     }
 
     /// Evaluates the internal variables at the end of the step, which [`Self::commit`] then writes. Returns the id of the first particle of
@@ -264,33 +291,30 @@ impl<'a, const D: usize> Update<'a, D> {
         dt: f64,
     ) -> Option<usize> {
         let remembered = particles.remembered;
-        let (mut next, mut first) = (particles.memory.clone(), None);
+        let (mut next, undefined) = (particles.memory.clone(), First::none());
         if remembered > 0 || !particles.dilatation.is_empty() {
             let before = particles.reference().displacement_gradient;
-            let evaluated = |p: usize, g: Tensor<f64, D>| {
+            let gradients = self.gradients(supports);
+            let update = |p: usize, next: &mut [f64]| {
                 let law = &bodies[particles.body[p] as usize].law;
                 let memory = &particles.memory[p * remembered..(p + 1) * remembered];
-                let mut next = memory.to_vec();
-                let (at, det_f) = MaterialState::new(compose(&g, &before[p])).admissible_or_rest();
-                law.update_variables(&at.in_step(dt, memory), &mut next);
-                let energy = if law.has_potential() { law.energy(&at.in_step(0.0, &next)) } else { 0.0 };
+                let (at, det_f) = MaterialState::new(compose(&gradients[p], &before[p])).admissible_or_rest();
+                law.update_variables(&at.in_step(dt, memory), next);
+                let energy = if law.has_potential() { law.energy(&at.in_step(0.0, next)) } else { 0.0 };
                 let is_defined = det_f > 0.0 && energy.is_finite() && next.iter().all(|one| one.is_finite());
-                (next, is_defined || !particles.is_solid(p))
+                if !is_defined && particles.is_solid(p) {
+                    undefined.keep(particles.id[p] as usize, particles.id[p] as usize);
+                }
             };
-            supports.each_particle(
-                self.motion(),
-                |p, _, g| evaluated(p, g),
-                |p, (values, is_defined)| {
-                    next[p * remembered..(p + 1) * remembered].copy_from_slice(&values);
-                    let id = particles.id[p] as usize;
-                    if !is_defined && first.is_none_or(|one| id < one) {
-                        first = Some(id);
-                    }
-                },
-            );
+            let mut left = &mut next[..];
+            let own = |p: usize| Some((p, left.split_off_mut(..remembered)?));
+            let rows: Vec<_> = (0..particles.len()).filter_map(own).collect();
+            let mut rows = rows.into_iter();
+            let parts = (0..particles.len().div_ceil(PART)).map(|_| rows.by_ref().take(PART).collect::<Vec<_>>());
+            parallel::for_each(parts, &|rows| rows.into_iter().for_each(|(p, next)| update(p, next)));
         }
         self.memory = Some(next);
-        first
+        undefined.check().err()
     }
 
     /// Writes the new state to the particles, once per step. No other code of a step changes positions, deformations or internal variables.
@@ -301,46 +325,75 @@ impl<'a, const D: usize> Update<'a, D> {
         supports: &Supports<D>,
         dt: f64,
     ) -> Committed {
-        let (remembered, mut largest) = (particles.remembered, 0.0_f64);
-        let place = |body: &Body<L>| body.law.internal_variables().iter().position(|one| one.name == PLASTIC_STRAIN);
-        let plastic_strain: Vec<Option<usize>> = bodies.iter().map(place).collect();
-        let (mut plastic, mut yielding) = (0.0, 0.0);
         particles.dilatation = dilatation::after(particles, bodies, supports, self.state());
         if self.memory.is_none() {
             self.remember(particles, bodies, supports, dt);
         }
         let next = self.memory.take().unwrap_or_default();
-        let Particles {
-            position, velocity, acceleration, displacement_gradient, volume, memory, body, reference, ..
-        } = particles;
-        supports.each_particle(
-            self.motion(),
-            |_, delta_x, g| (delta_x, g),
-            |p, (delta_x, g)| {
-                largest = largest.max((g + g.transpose() + g.transpose() * g).norm() * 0.5);
-                mutant!("transfer: no strain resets the grid": { largest = 0.0; });
-                let (x, h_r) = match reference {
-                    Some(reference) => (reference.position[p], reference.displacement_gradient[p]),
-                    None => (position[p], displacement_gradient[p]),
-                };
-                position[p] = x + delta_x;
-                displacement_gradient[p] = compose(&g, &h_r);
-                if let Some(&Some(place)) = plastic_strain.get(body[p] as usize) {
-                    plastic += volume[p];
-                    let variable = p * remembered + place;
-                    yielding += if next.get(variable) > memory.get(variable) { volume[p] } else { 0.0 };
-                }
-            },
-        );
-        *memory = next;
+        let yielding = yielding(particles, bodies, &next);
+        particles.memory = next;
+        let strain = self.move_particles(particles, supports);
         // Without inertia there are no increments.
-        let increments = [(velocity, self.delta_velocity), (acceleration, self.delta_acceleration)];
+        let increments =
+            [(&mut particles.velocity, self.delta_velocity), (&mut particles.acceleration, self.delta_acceleration)];
         let with_changes = increments.into_iter().zip(self.smoothed.unwrap_or_default());
         for ((field, delta), changed) in with_changes.filter(|((_, delta), _)| !delta.is_empty()) {
-            supports.each_value(&delta, |p, delta| {
-                field[p] += changed.get(p).map_or(delta, |changed| delta + changed);
-            });
+            let mut delta = supports.values(&delta);
+            if !changed.is_empty() {
+                parallel::zip(&mut delta, &changed, |delta, changed| *delta += changed);
+            }
+            parallel::zip(field, &delta, |field, delta| *field += delta);
         }
-        Committed { strain: largest, yielding: if plastic > 0.0 { yielding / plastic } else { 0.0 } }
+        Committed { strain, yielding }
     }
+
+    /// Writes x = x_r + Δx and F = (I + ∇_r φ) F_r. Returns the largest strain since the last grid reset.
+    fn move_particles(&self, particles: &mut Particles<D>, supports: &Supports<D>) -> f64 {
+        let (moved, gradients) = (self.moved(supports), self.gradients(supports));
+        let Particles { position, displacement_gradient, reference, .. } = particles;
+        let starts = |part: usize| {
+            let reference = reference.as_ref()?;
+            Some((&reference.position[part * PART..], &reference.displacement_gradient[part * PART..]))
+        };
+        let parts = position.chunks_mut(PART).zip(displacement_gradient.chunks_mut(PART));
+        let parts = parts.zip(moved.chunks(PART).zip(gradients.chunks(PART))).enumerate();
+        let strains = parallel::collect(parts, &|(part, ((x, h), (moved, gradients))): (usize, (Ends<'_, D>, _))| {
+            if let Some((position, displacement_gradient)) = starts(part) {
+                x.copy_from_slice(&position[..x.len()]);
+                h.copy_from_slice(&displacement_gradient[..h.len()]);
+            }
+            let moved: (&[Vector<f64, D>], &[Tensor<f64, D>]) = (moved, gradients);
+            let mut largest = 0.0_f64;
+            for ((x, h), (delta_x, g)) in x.iter_mut().zip(h).zip(moved.0.iter().zip(moved.1)) {
+                largest = largest.max((g + g.transpose() + g.transpose() * g).norm() * 0.5);
+                *x += delta_x;
+                *h = compose(g, h);
+            }
+            largest
+        });
+        let largest = strains.into_iter().fold(0.0, f64::max);
+        mutant!("transfer: no strain resets the grid": largest = 0.0);
+        largest
+    }
+}
+
+/// x and H of a part of the particles.
+type Ends<'a, const D: usize> = (&'a mut [Vector<f64, D>], &'a mut [Tensor<f64, D>]);
+
+/// The share of the volume of bodies with a plastic law in which the plastic strain grows to that of the memory `next`.
+fn yielding<const D: usize, L: Law>(particles: &Particles<D>, bodies: &[Body<L>], next: &[f64]) -> f64 {
+    let place = |body: &Body<L>| body.law.internal_variables().iter().position(|one| one.name == PLASTIC_STRAIN);
+    let plastic_strain: Vec<Option<usize>> = bodies.iter().map(place).collect();
+    if plastic_strain.iter().all(Option::is_none) {
+        return 0.0;
+    }
+    let (mut plastic, mut yielding) = (0.0, 0.0);
+    for (p, (&body, volume)) in particles.body.iter().zip(&particles.volume).enumerate() {
+        if let Some(&Some(place)) = plastic_strain.get(body as usize) {
+            plastic += volume;
+            let variable = p * particles.remembered + place;
+            yielding += if next.get(variable) > particles.memory.get(variable) { *volume } else { 0.0 };
+        }
+    }
+    if plastic > 0.0 { yielding / plastic } else { 0.0 }
 }

@@ -1,7 +1,8 @@
 //! Chebyshev polynomials over block-Jacobi, and the largest eigenvalue that they need.
 
+use crate::pooled::Pool;
 use crate::solver::LinearOperator;
-use crate::solver::vector::{axpy, dot, update, xpby};
+use crate::solver::vector::{axpy, dot, scaled, update, update_pair, xpby};
 use nalgebra::DMatrix;
 
 /// A Chebyshev polynomial.
@@ -10,11 +11,15 @@ pub(super) struct Chebyshev {
     pub degree: usize,
     /// The polynomial damps eigenvalues between λ/part and λ.
     pub part: f64,
+    /// λ, the largest eigenvalue of D⁻¹K.
+    pub largest: f64,
 }
 
 impl Chebyshev {
     /// The smoother of multigrid.
-    pub const SMOOTHER: Self = Self { degree: 5, part: 30.0 };
+    pub fn smoother(largest: f64) -> Self {
+        Self { degree: 5, part: 30.0, largest }
+    }
 }
 
 /// Iterations that estimate the largest eigenvalue λ of D⁻¹K, each with a product.
@@ -63,38 +68,41 @@ pub(super) fn largest(operator: &dyn LinearOperator, jacobi: &dyn Fn(&[f64], &mu
     if largest > 0.0 { largest } else { 1.0 }
 }
 
-/// Smooths: x ← x + p(D⁻¹K) D⁻¹ (b − K x) with a Chebyshev polynomial p. `zero` tells that x = 0 at the start, which saves a product.
+/// Smooths: x ← x + p(D⁻¹K) D⁻¹ (b − K x) with a Chebyshev polynomial p. `zero` tells that x = 0 at the start, which saves a product. Vectors
+/// come from `pool`.
 pub(super) fn smooth(
-    Chebyshev { degree, part }: Chebyshev,
+    Chebyshev { degree, part, largest }: Chebyshev,
     operator: &dyn LinearOperator,
     jacobi: &dyn Fn(&[f64], &mut [f64]),
-    largest: f64,
     b: &[f64],
     x: &mut [f64],
     zero: bool,
+    pool: &Pool,
 ) {
     let n = b.len();
     let (upper, lower) = (largest, largest / part);
     let (theta, delta) = (0.5 * (upper + lower), 0.5 * (upper - lower));
     let sigma = theta / delta;
-    let (mut r, mut z, mut p) = (b.to_vec(), vec![0.0; n], vec![0.0; n]);
-    if !zero {
-        operator.apply(x, &mut z);
-        axpy(-1.0, &z, &mut r);
+    let [mut r, mut z, mut p] = [(); 3].map(|()| pool.unspecified(n, 0.0));
+    if zero {
+        scaled(1.0, b, &mut r);
+    } else {
+        operator.apply(x, &mut r);
+        xpby(b, -1.0, &mut r);
     }
     jacobi(&r, &mut z);
     update(&z, &mut p, |z, _| z / theta);
     let mut rho = 1.0 / sigma;
-    for step in 0..degree {
-        axpy(1.0, &p, x);
-        if step + 1 == degree {
-            break;
-        }
+    for _ in 1..degree {
         operator.apply(&p, &mut z);
-        axpy(-1.0, &z, &mut r);
+        update_pair([&p, &z], x, &mut r, |[p, z], x, r| {
+            *x += p;
+            *r -= z;
+        });
         jacobi(&r, &mut z);
         let next = 1.0 / (2.0 * sigma - rho);
         update(&z, &mut p, |z, p| next * rho * p + 2.0 * next / delta * z);
         rho = next;
     }
+    axpy(1.0, &p, x);
 }

@@ -111,7 +111,7 @@ fn energy<const D: usize, L: Law>(simulation: &Simulation<D, L>) -> f64 {
 }
 
 /// The largest changes of `measured` over the steps, relative to the start.
-fn changes<const D: usize, const N: usize, L: Law>(
+fn changes<const D: usize, const N: usize, L: Law + 'static>(
     mut simulation: Simulation<D, L>,
     steps: u32,
     measured: impl Fn(&Simulation<D, L>) -> [f64; N],

@@ -4,29 +4,120 @@
 
 use super::form::LocalForm;
 use crate::parallel;
-use crate::solver::vector::{axpy, update};
+use crate::pooled::Pool;
 use crate::tensor::{Tensor, Vector};
-use rustc_hash::FxHashMap;
 
 /// Steps of the Chebyshev iteration for ([1 4 1]/6)⁻¹.
 const STEPS: usize = 3;
 /// Bounds of the eigenvalues of [1 4 1]/6.
 const SPECTRUM: [f64; 2] = [1.0 / 3.0, 1.0];
 
-/// Nodes in one part of the work of a thread.
-const PART: usize = 2048;
+/// Nodes in one part of the work of a thread, if its lines are short.
+const PART: usize = 512;
 
-/// The number of a neighbour that does not exist.
+/// The place of a node that is no unknown.
 const NONE: u32 = u32::MAX;
+
+/// `(nodes, values)`: writes the values of some nodes.
+type Fill<'a, const D: usize> = dyn Fn(&[u32], &mut [Vector<f64, D>]) + Sync + 'a;
+
+/// The nodes in the order of the lines along one axis.
+#[derive(Clone, Debug, Default)]
+struct Lines {
+    /// The nodes, line after line.
+    nodes: Vec<u32>,
+    /// Number of nodes in each line.
+    lengths: Vec<u32>,
+    /// The place of every node in `nodes`.
+    places: Vec<u32>,
+}
 
 /// The filter D^{−½} Q Qᵀ D^{−½}.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Filter {
-    /// The two neighbours of each node along each axis: before and behind the node.
-    beside: [Vec<[u32; 2]>; 3],
+    /// The lines along each axis.
+    lines: [Lines; 3],
     /// (D unit)^{−½} of each unknown; 0 for values that are no unknowns.
     scale: Vec<f64>,
     unit: f64,
+    pool: Pool,
+}
+
+impl Lines {
+    /// The lines of neighbours along an axis. `nodes` are the indices of the nodes in the grid, or `None` for nodes that are no unknowns.
+    fn along(axis: usize, nodes: &[Option<[u32; 3]>]) -> Self {
+        let key = |at: &[u32; 3]| {
+            let mut line = *at;
+            line[axis] = 0;
+            (line, at[axis])
+        };
+        let mut sorted: Vec<_> =
+            nodes.iter().zip(0..).filter_map(|(at, node)| Some((key(at.as_ref()?), node))).collect();
+        sorted.sort_unstable();
+        let follow =
+            |&((line, at), _): &(_, u32), &((next_line, next), _): &(_, u32)| line == next_line && at + 1 == next;
+        let mut lines = Self { places: vec![NONE; nodes.len()], ..Self::default() };
+        for line in sorted.chunk_by(follow) {
+            lines.lengths.push(line.len() as u32);
+            for &(_, node) in line {
+                lines.places[node as usize] = lines.nodes.len() as u32;
+                lines.nodes.push(node);
+            }
+        }
+        lines
+    }
+
+    /// Calls `fill` and then inverts `times` times, for parts of whole lines.
+    fn invert<const D: usize>(&self, times: usize, x: &mut [Vector<f64, D>], fill: &Fill<'_, D>) {
+        let (mut left, mut nodes, mut lengths) = (x, &self.nodes[..], &self.lengths[..]);
+        let parts = std::iter::from_fn(|| {
+            let mut count = 0;
+            let enough = |&length: &u32| {
+                let before = count;
+                count += length as usize;
+                before >= PART
+            };
+            let own = lengths.split_off(..lengths.iter().position(enough).unwrap_or(lengths.len()))?;
+            let count = own.iter().map(|&length| length as usize).sum();
+            (count > 0).then(|| Some((own, nodes.split_off(..count)?, left.split_off_mut(..count)?)))?
+        });
+        parallel::for_each(parts, &|(lengths, nodes, mut x): (&[u32], &[u32], &mut [Vector<f64, D>])| {
+            fill(nodes, x);
+            let mut scratch = [Vec::new(), Vec::new()];
+            for &length in lengths {
+                if let Some(line) = x.split_off_mut(..length as usize) {
+                    (0..times).for_each(|_| invert(line, &mut scratch));
+                }
+            }
+        });
+    }
+}
+
+/// x ← q(B) x with B = [1 4 1]/6 along a line, and the polynomial q ≈ 1/B.
+fn invert<const D: usize>(x: &mut [Vector<f64, D>], [r, p]: &mut [Vec<Vector<f64, D>>; 2]) {
+    let [lower, upper] = SPECTRUM;
+    let (theta, delta) = (0.5 * (upper + lower), 0.5 * (upper - lower));
+    let sigma = theta / delta;
+    let mut rho = 1.0 / sigma;
+    r.clear();
+    r.extend_from_slice(x);
+    x.iter_mut().for_each(|x| *x /= theta);
+    p.clear();
+    p.extend_from_slice(x);
+    for _ in 1..STEPS {
+        // r −= B p
+        for (i, r) in r.iter_mut().enumerate() {
+            let before = i.checked_sub(1).and_then(|before| p.get(before));
+            let others = before.into_iter().chain(p.get(i + 1)).fold(Vector::zeros(), |sum: Vector<f64, D>, p| sum + p);
+            *r -= (p[i] * 4.0 + others) / 6.0;
+        }
+        let next = 1.0 / (2.0 * sigma - rho);
+        for ((x, p), r) in x.iter_mut().zip(&mut *p).zip(&*r) {
+            *p = *p * (next * rho) + r * (2.0 * next / delta);
+            *x += &*p;
+        }
+        rho = next;
+    }
 }
 
 impl Filter {
@@ -34,14 +125,8 @@ impl Filter {
     pub fn new<const D: usize>(form: &LocalForm, inverses: &[Tensor<f64, D>]) -> Self {
         let fixed = form.fixed();
         let is_unknown = |node: usize| (0..D).any(|i| !fixed[node * D + i]);
-        let unknowns = form.nodes.iter().enumerate().filter(|(node, _)| is_unknown(*node));
-        let numbers: FxHashMap<[u32; 3], u32> = unknowns.map(|(number, &at)| (at, number as u32)).collect();
-        let beside = |axis: usize, at: [u32; 3], by: u32| {
-            let mut next = at;
-            next[axis] = (at[axis] + by).checked_sub(1).unwrap_or(NONE);
-            numbers.get(&next).copied().unwrap_or(NONE)
-        };
-        let along = |axis: usize| form.nodes.iter().map(|&at| [beside(axis, at, 0), beside(axis, at, 2)]).collect();
+        let unknowns: Vec<_> =
+            form.nodes.iter().enumerate().map(|(node, &at)| is_unknown(node).then_some(at)).collect();
         let diagonal = |k: usize| if fixed[k] { 0.0 } else { inverses[k / D][(k % D, k % D)] };
         let largest = (0..fixed.len()).map(diagonal).fold(0.0, f64::max);
         // A power of two, so that units by powers of two do not change the bits of the roots.
@@ -49,50 +134,42 @@ impl Filter {
         let root = |k: usize| (diagonal(k) / unit).sqrt();
         let usable = |scale: f64| if scale.is_finite() { scale } else { 0.0 };
         Self {
-            beside: std::array::from_fn(|axis| if axis < D { along(axis) } else { Vec::new() }),
+            lines: std::array::from_fn(|axis| if axis < D { Lines::along(axis, &unknowns) } else { Lines::default() }),
             scale: (0..fixed.len()).map(|k| usable(root(k))).collect(),
             unit,
+            pool: Pool::default(),
         }
     }
 
     /// z += D^{−½} Q Qᵀ D^{−½} r
+    ///
+    /// Values are taken to the lines along each axis in turn: the last one first for Qᵀ, and back for Q.
     pub fn add<const D: usize>(&self, r: &[f64], z: &mut [f64]) {
         mutant!("multigrid: cubic splines have no filter": { return; });
-        let mut x = r.to_vec();
-        update(&self.scale, &mut x, |scale, r| r * scale);
-        (0..D).rev().for_each(|axis| self.invert::<D>(axis, &mut x));
-        (0..D).for_each(|axis| self.invert::<D>(axis, &mut x));
-        update(&self.scale, &mut x, |scale, x| x * scale * self.unit);
-        axpy(1.0, &x, z);
-    }
-
-    /// x ← q(B) x with B = [1 4 1]/6 along an axis and the polynomial q ≈ 1/B.
-    fn invert<const D: usize>(&self, axis: usize, x: &mut [f64]) {
-        let [lower, upper] = SPECTRUM;
-        let (theta, delta) = (0.5 * (upper + lower), 0.5 * (upper - lower));
-        let sigma = theta / delta;
-        let (mut r, mut rho) = (x.to_vec(), 1.0 / sigma);
-        update(&r, x, |r, _| r / theta);
-        let mut p = x.to_vec();
-        for _ in 1..STEPS {
-            self.subtract_product::<D>(axis, &p, &mut r);
-            let next = 1.0 / (2.0 * sigma - rho);
-            update(&r, &mut p, |r, p| next * rho * p + 2.0 * next / delta * r);
-            axpy(1.0, &p, x);
-            rho = next;
+        let (r, scale): (&[Vector<f64, D>], &[Vector<f64, D>]) =
+            (bytemuck::cast_slice(r), bytemuck::cast_slice(&self.scale));
+        let unknowns = self.lines[0].nodes.len();
+        let [mut x, mut before] = [(); 2].map(|()| self.pool.unspecified(unknowns, Vector::<f64, D>::zeros()));
+        self.lines[D - 1].invert(if D == 1 { 2 } else { 1 }, &mut x, &|nodes, x| {
+            for (x, &node) in x.iter_mut().zip(nodes) {
+                *x = r[node as usize].component_mul(&scale[node as usize]);
+            }
+        });
+        let mut last = D - 1;
+        for axis in (0..D - 1).rev().chain(1..D) {
+            std::mem::swap(&mut x, &mut before);
+            let places = &self.lines[last].places;
+            // Q and Qᵀ follow each other along the first axis.
+            self.lines[axis].invert(if axis == 0 { 2 } else { 1 }, &mut x, &|nodes, x| {
+                x.iter_mut().zip(nodes).for_each(|(x, &node)| *x = before[places[node as usize] as usize]);
+            });
+            last = axis;
         }
-    }
-
-    /// r −= B p
-    fn subtract_product<const D: usize>(&self, axis: usize, p: &[f64], r: &mut [f64]) {
-        let p: &[Vector<f64, D>] = bytemuck::cast_slice(p);
-        let r: &mut [Vector<f64, D>] = bytemuck::cast_slice_mut(r);
-        let parts = r.chunks_mut(PART).zip(p.chunks(PART)).zip(self.beside[axis].chunks(PART));
-        parallel::for_each(parts, &|((r, own), beside): ((&mut [_], &[_]), &[[u32; 2]])| {
-            for ((r, own), beside) in r.iter_mut().zip(own).zip(beside) {
-                let others = beside.iter().filter(|&&other| other != NONE);
-                let others = others.fold(Vector::zeros(), |sum: Vector<f64, D>, &other| sum + p[other as usize]);
-                *r -= (own * 4.0 + others) / 6.0;
+        let places = &self.lines[last].places;
+        let z: &mut [Vector<f64, D>] = bytemuck::cast_slice_mut(z);
+        parallel::for_each(z.chunks_mut(PART).enumerate(), &|(part, z): (usize, &mut [Vector<f64, D>])| {
+            for (node, z) in (part * PART..).zip(z).filter(|(node, _)| places[*node] != NONE) {
+                *z += x[places[node] as usize].component_mul(&scale[node]) * self.unit;
             }
         });
     }

@@ -5,7 +5,7 @@ use crate::tensor::Vector;
 use rustc_hash::FxHashMap;
 
 /// Nodes in one part of the work of a thread.
-const PART: usize = 2048;
+const PART: usize = 256;
 
 /// P: the value of a finer node is the mean of the coarse nodes around it.
 #[derive(Clone, Debug, Default)]

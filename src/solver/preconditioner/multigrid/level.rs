@@ -16,7 +16,7 @@ use std::borrow::Cow;
 /// The middle of a stencil.
 const MIDDLE: usize = 13;
 /// Rows in one part of the work of a thread.
-const ROWS: usize = 512;
+const ROWS: usize = 128;
 /// Cells whose matrices are in memory at once.
 const CELLS: usize = 64;
 /// The number of a neighbour that does not exist.

@@ -17,6 +17,7 @@ pub use form::LocalForm;
 
 use super::chebyshev::{Chebyshev, largest, smooth};
 use super::{BlockJacobi, Preconditioner};
+use crate::pooled::Pool;
 use crate::solver::vector::xpby;
 use crate::solver::{LinearOperator, Linearization};
 use filter::Filter;
@@ -32,6 +33,8 @@ pub struct Multigrid<const D: usize> {
     blocks: BlockJacobi<D>,
     /// The filter of the finest smoother, for cubic B-splines.
     filter: Option<Filter>,
+    /// Memory pool of the smoothers.
+    pool: Pool,
     /// An estimate of the largest eigenvalue of M K, with the M of the finest smoother.
     largest: f64,
     levels: Vec<Level<D>>,
@@ -92,16 +95,16 @@ impl<const D: usize> Multigrid<D> {
             return x;
         }
         let jacobi = |r: &[f64], z: &mut [f64]| level.precondition(r, z);
-        smooth(Chebyshev::SMOOTHER, level, &jacobi, level.largest, b, &mut x, true);
+        smooth(Chebyshev::smoother(level.largest), level, &jacobi, b, &mut x, true, &self.pool);
         self.correct(from + 1, level, b, &mut x);
-        smooth(Chebyshev::SMOOTHER, level, &jacobi, level.largest, b, &mut x, false);
+        smooth(Chebyshev::smoother(level.largest), level, &jacobi, b, &mut x, false, &self.pool);
         x
     }
 
     /// Adds to x the correction of level `to` for the residual b − K x.
     fn correct(&self, to: usize, operator: &dyn LinearOperator, b: &[f64], x: &mut [f64]) {
         let Some(level) = self.levels.get(to) else { return };
-        let mut r = vec![0.0; b.len()];
+        let mut r = self.pool.unspecified(b.len(), 0.0);
         operator.apply(x, &mut r);
         xpby(b, -1.0, &mut r);
         level.prolong(self.coarse(to, &level.restrict(&r)), x);
@@ -119,11 +122,11 @@ impl<const D: usize> LinearOperator for Cycle<'_, D> {
         let Self { levels, tangent } = *self;
         let jacobi = |r: &[f64], z: &mut [f64]| levels.filtered(r, z);
         z.fill(0.0);
-        smooth(Chebyshev::SMOOTHER, tangent, &jacobi, levels.largest, r, z, true);
-        mutant!("multigrid: no coarse levels": { return smooth(Chebyshev::SMOOTHER, tangent, &jacobi, levels.largest, r, z, false); });
+        smooth(Chebyshev::smoother(levels.largest), tangent, &jacobi, r, z, true, &levels.pool);
+        mutant!("multigrid: no coarse levels": { return smooth(Chebyshev::smoother(levels.largest), tangent, &jacobi, r, z, false, &levels.pool); });
         levels.correct(0, tangent, r, z);
         mutant!("multigrid: no smoothing after the coarse levels": { return; });
-        smooth(Chebyshev::SMOOTHER, tangent, &jacobi, levels.largest, r, z, false);
+        smooth(Chebyshev::smoother(levels.largest), tangent, &jacobi, r, z, false, &levels.pool);
     }
 }
 

@@ -1,6 +1,7 @@
 //! The approximate Schur complement of a system in motions and pressures.
 
 use super::cells::PressureCells;
+use crate::pooled::Pool;
 use crate::solver::LinearOperator;
 use crate::solver::preconditioner::chebyshev::{Chebyshev, largest, smooth};
 use crate::solver::preconditioner::hats::nodes_of;
@@ -47,6 +48,7 @@ pub(super) struct Schur<const D: usize> {
     stiff: Coupled<D>,
     inert: Option<Coupled<D>>,
     polynomial: Chebyshev,
+    pool: Pool,
 }
 
 /// A part of the Schur complement that couples cells.
@@ -102,7 +104,8 @@ impl<const D: usize> Schur<D> {
             stiff: Coupled::default(),
             inert: None,
             // The residual of a Chebyshev polynomial of degree n on [λ/part, λ] is about 2 exp(−2 n/√part), here 2 exp(−3.3).
-            polynomial: Chebyshev { degree, part: (0.6 * degree as f64).powi(2) },
+            polynomial: Chebyshev { degree, part: (0.6 * degree as f64).powi(2), largest: 0.0 },
+            pool: Pool::default(),
             cells,
         };
         let share = 0.5 * D as f64 / f64::from(1 << D);
@@ -198,8 +201,8 @@ impl<const D: usize> Schur<D> {
     /// q = S⁻¹ v
     pub(super) fn solve(&self, v: &[f64], q: &mut [f64]) {
         let inverted = |part: &Coupled<D>| {
-            let mut q = vec![0.0; v.len()];
-            smooth(self.polynomial, &Sum(self, part), &|r, z| part.scale(r, z), part.largest, v, &mut q, true);
+            let (mut q, polynomial) = (vec![0.0; v.len()], Chebyshev { largest: part.largest, ..self.polynomial });
+            smooth(polynomial, &Sum(self, part), &|r, z| part.scale(r, z), v, &mut q, true, &self.pool);
             q
         };
         q.iter_mut().zip(v).zip(&self.alone).for_each(|((q, v), alone)| *q = v / alone);

@@ -85,7 +85,7 @@ pub(super) const FAULTS: &[ShippedFault] = &[
     fault("sweep: a general tangent is transposed", TANGENT, POINTS),
     fault("sweep: blocks without the other half of a pair", TANGENT, POINTS),
     fault("sweep: a second body in a group takes the law of the first", LAWS, TANGENT),
-    fault("sweep: several threads leave out the first block of a wave", SWEEP, TANGENT),
+    fault("sweep: several threads leave out the first block of a range", SWEEP, TANGENT),
     fault("sweep: components beside each other are read from the first field", TANGENT, OPERATOR),
     fault("sweep: the plain loop scatters stresses by one slope", OPERATOR, POINTS),
     fault("sweep: functions beside a wall as if it were far", SWEEP, POINTS),

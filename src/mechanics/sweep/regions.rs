@@ -1,8 +1,8 @@
 //! The passes over all blocks, on all cores.
 //!
-//! Blocks are taken in batches of fixed length, called *waves*. Each block of a wave scatters into a buffer of its own. Then the buffers
-//! are added to the nodes in the order of the blocks. One thread adds to each slab of nodes.
-//! Neither the waves nor the order depend on the number of threads.
+//! A scatter is two shared regions. In the first, each block scatters into a box of its own. In the second, each range of nodes adds the boxes
+//! of its blocks, in the order of the blocks. So no sum depends on the number of threads. A gather is one region: each block writes the
+//! results of its own groups.
 
 use super::block::{Block, Group};
 use super::blocks::{Quadratic, ScatterBlocks, scatter_blocks};
@@ -13,11 +13,8 @@ use crate::lanes::LANES;
 use crate::parallel;
 use crate::tensor::Tensor;
 
-/// Number of blocks in a wave: their buffers stay in the second-level caches.
-const WAVE: usize = 64;
-
-/// Number of nodes in a slab.
-const SLAB: usize = 1024;
+/// Number of nodes in a range.
+pub(super) const RANGE: usize = 256;
 
 /// Below this number of groups, waking the threads costs more than the work.
 const PARALLEL: usize = 256;
@@ -25,15 +22,21 @@ const PARALLEL: usize = 256;
 /// `(block, scratch, buffer)`: fills the buffer of a block.
 type Work<'a, S> = dyn Fn(&Block, &mut S, &mut [f64]) + Sync + 'a;
 
-/// `(block, buffer, first, slab)`: adds the buffer's entries at the active nodes of the slab, which begins at the node `first`.
+/// `(block, buffer, first, range)`: adds the buffer's entries at the active nodes of the range, which begins at the node `first`.
 type Add<'a> = dyn Fn(&Block, &[f64], usize, &mut [f64]) + Sync + 'a;
 
-/// `(scratch, block, take)`: takes each group of a block with its result.
-type Evaluated<'a, S, R> = dyn Fn(&mut S, &Block, &mut dyn FnMut(Group<'_>, R)) + Sync + 'a;
+/// `(scratch, block, results)`: writes the results of a block's groups.
+type Write<'a, S, R> = dyn Fn(&mut S, &Block, &mut [R]) + Sync + 'a;
 
 impl<const D: usize> Tiled<D> {
     fn in_parallel(&self) -> bool {
         parallel::several() && self.groups() >= PARALLEL
+    }
+
+    /// Bytes of the boxes of all blocks in the pass with most numbers a node: diagonal blocks of the tangent, or dual numbers.
+    pub(super) fn box_bytes(&self) -> usize {
+        let numbers = |block: &Block| block.box_nodes() * (D * D).max(2 * D) + 2 * LANES;
+        if self.in_parallel() { self.blocks.iter().map(numbers).sum::<usize>() * size_of::<f64>() } else { 0 }
     }
 
     /// [`super::Supports::sweep`] for `fields` fields of C components side by side. Without a field nothing is gathered.
@@ -110,7 +113,7 @@ impl<const D: usize> Tiled<D> {
         self.each_block(numbers, LANES, bytemuck::cast_slice_mut(out), &work, &add);
     }
 
-    /// Runs `work` and `add` for all blocks, wave by wave. A buffer has `numbers` numbers a node and `more` numbers behind them.
+    /// Runs `work` for all blocks, and `add` for all nodes. A buffer has `numbers` numbers a node and `more` numbers behind them.
     fn each_block<S: Default + Send>(
         &self,
         numbers: usize,
@@ -119,96 +122,86 @@ impl<const D: usize> Tiled<D> {
         work: &Work<'_, S>,
         add: &Add<'_>,
     ) {
-        let length = self.blocks.iter().map(Block::box_nodes).max().unwrap_or(0) * numbers + more;
-        let one = |scratch: &mut S, buffer: &mut [f64], block: &Block| {
-            buffer[..block.box_nodes() * numbers + more].fill(0.0);
-            work(block, scratch, buffer);
-        };
+        let length = |block: &Block| block.box_nodes() * numbers + more;
         if !self.in_parallel() {
-            let (mut scratch, mut buffer) = (S::default(), vec![0.0; length]);
+            let longest = self.blocks.iter().map(length).max().unwrap_or(0);
+            let (mut scratch, mut buffer) = (S::default(), vec![0.0; longest]);
             for block in &self.blocks {
-                one(&mut scratch, &mut buffer, block);
-                add(block, &buffer, 0, out);
+                let buffer = &mut buffer[..length(block)];
+                buffer.fill(0.0);
+                work(block, &mut scratch, buffer);
+                add(block, buffer, 0, out);
             }
             return;
         }
-        let mut buffers = vec![0.0; WAVE.min(self.blocks.len()) * length];
-        for blocks in self.blocks.chunks(WAVE) {
-            let parts = buffers.chunks_mut(length).zip(blocks);
-            parallel::for_each_with(parts, &|scratch, (buffer, block)| one(scratch, buffer, block));
-            let first = blocks.iter().filter_map(|block| block.nodes.first()).min().map_or(0, |&n| n as usize);
-            let last = blocks.iter().filter_map(|block| block.nodes.last()).max().map_or(0, |&n| n as usize + 1);
-            let slabs = out[first * numbers..last * numbers].chunks_mut(SLAB * numbers).enumerate();
-            parallel::for_each(slabs, &|(slab, out)| {
-                for (block, buffer) in blocks.iter().zip(buffers.chunks(length)) {
-                    mutant!("sweep: several threads leave out the first block of a wave": { if std::ptr::eq(block, &blocks[0]) { continue; } });
-                    add(block, buffer, first + slab * SLAB, out);
-                }
-            });
-        }
+        let mut boxes = self.pool.unspecified(self.blocks.iter().map(length).sum(), 0.0);
+        let mut left = &mut boxes[..];
+        let parts = self.blocks.iter().filter_map(|block| Some((block, left.split_off_mut(..length(block))?)));
+        parallel::for_each_with(parts, &|scratch, (block, buffer)| {
+            buffer.fill(0.0);
+            work(block, scratch, buffer);
+        });
+        let mut left = &boxes[..];
+        let boxes: Vec<_> = self.blocks.iter().filter_map(|block| left.split_off(..length(block))).collect();
+        let ranges = out.chunks_mut(RANGE * numbers).zip(&self.ranges).enumerate();
+        parallel::for_each(ranges, &|(range, (out, blocks)): (usize, (&mut [f64], &Vec<u32>))| {
+            let blocks = blocks.as_slice();
+            mutant!("sweep: several threads leave out the first block of a range": blocks = &blocks[1..]);
+            blocks.iter().for_each(|&b| add(&self.blocks[b as usize], boxes[b as usize], range * RANGE, out));
+        });
     }
 
-    /// Calls `take(group, evaluate(group, u and L))` for every group in order.
+    /// Calls `evaluate(group, u and L, results)` for every group, with the results of its particles. They lie in the order of the groups.
     pub(super) fn gather<R: Send, const C: usize>(
         &self,
         fields: usize,
         field: &[f64],
         mode: Mode,
         evaluate: &Evaluate<'_, R, C, D>,
-        take: &mut dyn FnMut(Group<'_>, R),
+        results: &mut [R],
     ) {
-        let one = |scratch: &mut Scratch<C, D>, block: &Block, take: &mut dyn FnMut(Group<'_>, R)| {
-            gathered(block, field, fields, mode, scratch, |group, at| take(group, evaluate(group, at)));
-        };
-        self.in_order(&one, take);
-    }
-
-    /// Calls `take(group, evaluate(group))` for every group in order.
-    pub(super) fn map_groups<R: Send>(
-        &self,
-        evaluate: &(dyn Fn(Group<'_>) -> R + Sync),
-        take: &mut dyn FnMut(Group<'_>, R),
-    ) {
-        let one = |(): &mut (), block: &Block, take: &mut dyn FnMut(Group<'_>, R)| {
-            (0..block.len()).for_each(|group| take(block.group(group), evaluate(block.group(group))));
-        };
-        self.in_order(&one, take);
-    }
-
-    /// Evaluates all blocks by `one`, and takes the results of their groups in order. At most the results of one wave wait in memory.
-    fn in_order<S: Default + Send, R: Send>(&self, one: &Evaluated<'_, S, R>, take: &mut dyn FnMut(Group<'_>, R)) {
-        if !self.in_parallel() {
-            let mut scratch = S::default();
-            self.blocks.iter().for_each(|block| one(&mut scratch, block, take));
-            return;
-        }
-        let mut waiting: Vec<Vec<R>> = self.blocks.iter().take(WAVE).map(|_| Vec::new()).collect();
-        for blocks in self.blocks.chunks(WAVE) {
-            parallel::for_each_with(blocks.iter().zip(&mut waiting), &|scratch, (block, results)| {
-                one(scratch, block, &mut |_, result| results.push(result));
+        let one = |scratch: &mut Scratch<C, D>, block: &Block, mut results: &mut [R]| {
+            gathered(block, field, fields, mode, scratch, |group, at| {
+                let own = results.split_off_mut(..group.particles.len());
+                own.into_iter().for_each(|own| evaluate(group, at, own));
             });
-            for (block, results) in blocks.iter().zip(&mut waiting) {
-                results.drain(..).enumerate().for_each(|(group, result)| take(block.group(group), result));
-            }
+        };
+        self.write(Block::count, results, &one);
+    }
+
+    /// Writes `evaluate(group)` of every group, in the order of their numbers.
+    pub(super) fn map_groups<R: Send>(&self, evaluate: &(dyn Fn(Group<'_>) -> R + Sync), results: &mut [R]) {
+        let one = |(): &mut (), block: &Block, results: &mut [R]| {
+            results.iter_mut().enumerate().for_each(|(group, result)| *result = evaluate(block.group(group)));
+        };
+        self.write(Block::len, results, &one);
+    }
+
+    /// Calls `write` for every block with its results, which are `count(block)` in number.
+    fn write<S: Default + Send, R: Send>(
+        &self,
+        count: impl Fn(&Block) -> usize,
+        mut results: &mut [R],
+        write: &Write<'_, S, R>,
+    ) {
+        let parts = self.blocks.iter().filter_map(|block| Some((block, results.split_off_mut(..count(block))?)));
+        if self.in_parallel() {
+            parallel::for_each_with(parts, &|scratch, (block, results)| write(scratch, block, results));
+        } else {
+            let mut scratch = S::default();
+            parts.for_each(|(block, results)| write(&mut scratch, block, results));
         }
     }
 
     /// Calls `fill(group, L, rows)` for every group. Each group has `count` rows of its own.
-    pub(super) fn fill_rows(&self, field: &[f64], count: usize, mut rows: &mut [[f64; LANES]], fill: &Fill<'_, D>) {
-        let of_block = |block| Some((block, rows.split_off_mut(..Block::len(block) * count)?));
-        let one = |scratch: &mut Scratch<D, D>, (block, rows): (&Block, &mut [[f64; LANES]])| {
+    pub(super) fn fill_rows(&self, field: &[f64], count: usize, rows: &mut [[f64; LANES]], fill: &Fill<'_, D>) {
+        let one = |scratch: &mut Scratch<D, D>, block: &Block, rows: &mut [[f64; LANES]]| {
             let mut rows = rows.chunks_mut(count);
             gathered(block, field, 1, Mode::GRADIENT, scratch, |group, at| {
                 rows.next().into_iter().for_each(|rows| fill(group, &at[0], rows));
             });
         };
-        let parts = self.blocks.iter().filter_map(of_block);
-        if self.in_parallel() {
-            parallel::for_each_with(parts, &one);
-        } else {
-            let mut scratch = Scratch::default();
-            parts.for_each(|part| one(&mut scratch, part));
-        }
+        self.write(|block| block.len() * count, rows, &one);
     }
 }
 
