@@ -39,10 +39,12 @@ impl<const D: usize> MovedOutlines<D> {
         }
         let lines = particles.outlines.iter().map(|outline| {
             let of_body = solid.iter().filter(|&&p| particles.body[p] == outline.body);
-            let near: Vec<(u32, Vector<f64, D>)> = of_body
+            let mut near: Vec<(u32, Vector<f64, D>)> = of_body
                 .map(|&p| particles.id[p])
                 .filter_map(|id| Some((id, *reference.position.get(id as usize)?)))
                 .collect();
+            // After a restart, the particles lie in another order.
+            near.sort_unstable_by_key(|(id, _)| *id);
             let corners = outline.corners.iter().map(|at| Corner::of(at, &near, REACH * spacing)).collect();
             Line { body: outline.body, corners }
         });

@@ -42,7 +42,7 @@ impl<const D: usize> Shape<D> {
 
     /// Closed lines around the part of a solid of the plane in the grid, and around its holes: the corners of each line, with the solid at
     /// the left. No segment is longer than the diagonal of a box of this edge. `None` in other dimensions, and for a surface that is not
-    /// approximated by segments with common ends, such as that of pixels.
+    /// approximated by segments with common ends.
     pub(crate) fn closed_lines(&self, grid: &Grid<D>, edge: f64) -> Option<Vec<Vec<Vector<f64, D>>>> {
         if D != 2 {
             return None;
@@ -100,7 +100,7 @@ fn joined<const D: usize>(mut segments: Vec<[Vector<f64, D>; 2]>, gap: f64) -> O
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shape::{Ball, Difference, HalfSpace, Mask, Pixels, Polygon};
+    use crate::shape::{Ball, Difference, HalfSpace, Polygon};
     use std::f64::consts::PI;
 
     /// The area to the left of the lines.
@@ -129,10 +129,6 @@ mod tests {
             assert_eq!(found.len(), lines, "{shape:?}");
             assert!((area(&found) / exact - 1.0).abs() < bound, "{shape:?}: {} for {exact}", area(&found));
         }
-        // A staircase with several steps in a box.
-        let steps = Mask::new([20, 20, 1], (0..400).map(|i| i % 20 + i / 20 < 20)).ok_or("no mask")?;
-        let stairs = Pixels::<2>::new(Vector::repeat(0.2), Vector::repeat(0.7), steps).ok_or("no stairs")?;
-        assert_eq!(Shape::from(stairs).closed_lines(&grid, 0.05), None);
         Ok(())
     }
 }
