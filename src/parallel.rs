@@ -99,6 +99,12 @@ pub fn in_pool<R: Send>(f: impl FnOnce() -> R + Send) -> R {
     rayon::scope(|_| f())
 }
 
+/// Runs `f` with this number of threads.
+#[cfg(test)]
+pub(crate) fn with_threads<R: Send>(count: usize, f: impl FnOnce() -> R + Send) -> R {
+    rayon::ThreadPoolBuilder::new().num_threads(count).build().unwrap().install(f)
+}
+
 /// Locks a mutex. The data stays usable after a thread panicked while it held the lock.
 pub(crate) fn held<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
@@ -153,7 +159,7 @@ pub(crate) fn collect<P: Send, R: Send>(parts: impl Iterator<Item = P>, f: &(dyn
     }
 }
 
-/// Elements in one task of [`zip`].
+/// Particles or nodes in one task of a pass over arrays.
 pub(crate) const PART: usize = 2048;
 
 /// `f(x, y)` for all pairs of elements.
@@ -203,8 +209,7 @@ mod tests {
     #[test]
     fn everything_is_done_once_and_in_its_place() {
         for threads in [1, 3] {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| {
+            with_threads(threads, || {
                 assert_eq!(several(), threads > 1);
                 assert_eq!(map(1000, &|k| 3 * k), (0..1000).map(|k| 3 * k).collect::<Vec<_>>());
                 let mut numbers = vec![0; 1000];

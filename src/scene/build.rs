@@ -12,7 +12,7 @@ use crate::grid::Grid;
 use crate::mechanics::smoothing::Smoothing;
 use crate::particles::{self, Particles};
 use crate::shape::Shape;
-use crate::simulation::{Settings, Simulation, same};
+use crate::simulation::{Settings, Simulation, as_type};
 use crate::solver::{Forcing, NewtonSettings};
 use crate::tensor::Vector;
 use std::path::Path;
@@ -74,9 +74,9 @@ impl Scene {
     /// The errors of [`Self::build`], and particles that certainly need more memory, before room is made for them.
     pub fn build_within<const D: usize>(&self, folder: &Path, memory: u64) -> Result<Simulation<D>, BuildError> {
         let built = match D {
-            1 => same(BUILD_1(self, folder, memory)),
-            2 => same(BUILD_2(self, folder, memory)),
-            3 => same(BUILD_3(self, folder, memory)),
+            1 => as_type(BUILD_1(self, folder, memory)),
+            2 => as_type(BUILD_2(self, folder, memory)),
+            3 => as_type(BUILD_3(self, folder, memory)),
             _ => None,
         };
         built.unwrap_or_else(|| Err(other_dimension(D)))

@@ -19,15 +19,15 @@ pub(super) fn step<const D: usize>(
     spent: &mut Spent,
 ) -> Option<Result<StepReport<D>, StepError>> {
     match D {
-        1 => same(STEP_1(simulation.downcast_mut()?, spent)),
-        2 => same(STEP_2(simulation.downcast_mut()?, spent)),
-        3 => same(STEP_3(simulation.downcast_mut()?, spent)),
+        1 => as_type(STEP_1(simulation.downcast_mut()?, spent)),
+        2 => as_type(STEP_2(simulation.downcast_mut()?, spent)),
+        3 => as_type(STEP_3(simulation.downcast_mut()?, spent)),
         _ => None,
     }
 }
 
 /// `value`, if its type is `U`.
-pub(crate) fn same<T: 'static, U: 'static>(value: T) -> Option<U> {
+pub(crate) fn as_type<T: 'static, U: 'static>(value: T) -> Option<U> {
     let mut value = Some(value);
     (&mut value as &mut dyn Any).downcast_mut::<Option<U>>().and_then(Option::take)
 }

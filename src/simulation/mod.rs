@@ -17,7 +17,7 @@ mod touching;
 mod work;
 
 pub use crate::mechanics::loads::Reaction;
-pub(crate) use compiled::same;
+pub(crate) use compiled::as_type;
 pub use contacts::ContactForces;
 pub use history::History;
 pub use next_step::NextStep;
@@ -36,14 +36,11 @@ use crate::mechanics::schemes::Alphas;
 use crate::mechanics::sweep::{Fields, Points, Supports};
 use crate::mechanics::transfer::Nodal;
 use crate::mechanics::unknowns::Unknowns;
-use crate::parallel;
+use crate::parallel::{self, PART};
 use crate::particles::{Body, Particles};
 use crate::pooled::Pool;
 use crate::solver::Krylov;
 use crate::tensor::Vector;
-
-/// Particles in one part of the work of a thread.
-const PART: usize = 2048;
 
 /// An implicit material point simulation in `D` dimensions.
 ///

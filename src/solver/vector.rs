@@ -136,13 +136,12 @@ mod tests {
         let y: Vec<f64> = x.iter().map(|x| 1.0 / (x + 1.5)).collect();
         let sequential: f64 = x.chunks(CHUNK).zip(y.chunks(CHUNK)).map(|(x, y)| dot_chunk(x, y)).sum();
         for threads in [1, 2, 3] {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            let (parallel, added) = pool.install(|| {
+            let (shared, added) = parallel::with_threads(threads, || {
                 let mut z = y.clone();
                 axpy(0.1, &x, &mut z);
                 (dot(&x, &y), z)
             });
-            assert_eq!(parallel.to_bits(), sequential.to_bits(), "{threads} threads");
+            assert_eq!(shared.to_bits(), sequential.to_bits(), "{threads} threads");
             assert!(added.iter().zip(&x).zip(&y).all(|((z, x), y)| z.to_bits() == (0.1 * x + y).to_bits()));
         }
     }

@@ -5,6 +5,7 @@
 //! form a class. If no mistake of the list explains it, a single additional term with one coefficient is fitted, and then it is asked
 //! whether all deviations lie in one place.
 
+mod list;
 mod mistakes;
 mod observation;
 mod places;
@@ -45,7 +46,7 @@ pub fn diagnose(convention: &Convention, observations: &[Observation]) -> Option
         return None;
     }
     let general = general(convention, &observations);
-    let candidates = mistakes::candidates(convention);
+    let candidates = list::candidates(convention);
     let explaining: Vec<&Candidate> =
         candidates.iter().filter(|candidate| explains(candidate, convention, &observations)).collect();
     let mut diagnosis = match explaining.as_slice() {
@@ -84,7 +85,7 @@ fn share(candidate: &Candidate, convention: &Convention, observations: &[Observa
 /// The mistake of the list that comes nearest, if it explains most of the deviation but not all: there may be a second one.
 pub fn nearest(convention: &Convention, observations: &[Observation]) -> Option<(String, f64)> {
     let observations = usable(convention, observations);
-    let candidates = mistakes::candidates(convention);
+    let candidates = list::candidates(convention);
     let shares =
         candidates.iter().map(|candidate| (candidate.name.clone(), share(candidate, convention, &observations)));
     shares.filter(|(_, share)| *share >= NEAREST).max_by(|a, b| a.1.total_cmp(&b.1))
@@ -153,7 +154,7 @@ pub fn invisible(convention: &Convention, observations: &[Observation]) -> Vec<S
     };
     let general = general(convention, &observations);
     let mut kinds: Vec<(&str, Vec<String>)> = Vec::new();
-    for candidate in mistakes::candidates(convention).into_iter().filter(hidden) {
+    for candidate in list::candidates(convention).into_iter().filter(hidden) {
         let shows_in = candidate.shows_in(general);
         match kinds.iter_mut().find(|(kind, _)| *kind == shows_in) {
             Some((_, names)) => names.push(candidate.name),

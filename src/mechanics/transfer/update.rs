@@ -18,6 +18,7 @@ use crate::tensor::{Tensor, Vector};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::cell::OnceCell;
+use std::ops::Range;
 
 /// The changes of velocity and acceleration that prescribed nodes give to the particles in the update.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
@@ -307,11 +308,16 @@ impl<'a, const D: usize> Update<'a, D> {
                 }
             };
             let mut left = &mut next[..];
-            let own = |p: usize| Some((p, left.split_off_mut(..remembered)?));
-            let rows: Vec<_> = (0..particles.len()).filter_map(own).collect();
-            let mut rows = rows.into_iter();
-            let parts = (0..particles.len().div_ceil(PART)).map(|_| rows.by_ref().take(PART).collect::<Vec<_>>());
-            parallel::for_each(parts, &|rows| rows.into_iter().for_each(|(p, next)| update(p, next)));
+            let part = |part: usize| {
+                let particles = part * PART..particles.len().min((part + 1) * PART);
+                Some((particles.clone(), left.split_off_mut(..particles.len() * remembered)?))
+            };
+            let parts = (0..particles.len().div_ceil(PART)).filter_map(part);
+            parallel::for_each(parts, &|(particles, mut next): (Range<usize>, &mut [f64])| {
+                for p in particles {
+                    next.split_off_mut(..remembered).into_iter().for_each(|next| update(p, next));
+                }
+            });
         }
         self.memory = Some(next);
         undefined.check().err()
@@ -351,20 +357,16 @@ impl<'a, const D: usize> Update<'a, D> {
     fn move_particles(&self, particles: &mut Particles<D>, supports: &Supports<D>) -> f64 {
         let (moved, gradients) = (self.moved(supports), self.gradients(supports));
         let Particles { position, displacement_gradient, reference, .. } = particles;
-        let starts = |part: usize| {
-            let reference = reference.as_ref()?;
-            Some((&reference.position[part * PART..], &reference.displacement_gradient[part * PART..]))
-        };
-        let parts = position.chunks_mut(PART).zip(displacement_gradient.chunks_mut(PART));
-        let parts = parts.zip(moved.chunks(PART).zip(gradients.chunks(PART))).enumerate();
-        let strains = parallel::collect(parts, &|(part, ((x, h), (moved, gradients))): (usize, (Ends<'_, D>, _))| {
-            if let Some((position, displacement_gradient)) = starts(part) {
-                x.copy_from_slice(&position[..x.len()]);
-                h.copy_from_slice(&displacement_gradient[..h.len()]);
+        let reference = reference.as_ref();
+        let parts = position.chunks_mut(PART).zip(displacement_gradient.chunks_mut(PART)).enumerate();
+        let strains = parallel::collect(parts, &|(part, (x, h)): (usize, Part<'_, D>)| {
+            let own = part * PART..part * PART + x.len();
+            if let Some(reference) = reference {
+                x.copy_from_slice(&reference.position[own.clone()]);
+                h.copy_from_slice(&reference.displacement_gradient[own.clone()]);
             }
-            let moved: (&[Vector<f64, D>], &[Tensor<f64, D>]) = (moved, gradients);
             let mut largest = 0.0_f64;
-            for ((x, h), (delta_x, g)) in x.iter_mut().zip(h).zip(moved.0.iter().zip(moved.1)) {
+            for ((x, h), (delta_x, g)) in x.iter_mut().zip(h).zip(moved[own.clone()].iter().zip(&gradients[own])) {
                 largest = largest.max((g + g.transpose() + g.transpose() * g).norm() * 0.5);
                 *x += delta_x;
                 *h = compose(g, h);
@@ -378,7 +380,7 @@ impl<'a, const D: usize> Update<'a, D> {
 }
 
 /// x and H of a part of the particles.
-type Ends<'a, const D: usize> = (&'a mut [Vector<f64, D>], &'a mut [Tensor<f64, D>]);
+type Part<'a, const D: usize> = (&'a mut [Vector<f64, D>], &'a mut [Tensor<f64, D>]);
 
 /// The share of the volume of bodies with a plastic law in which the plastic strain grows to that of the memory `next`.
 fn yielding<const D: usize, L: Law>(particles: &Particles<D>, bodies: &[Body<L>], next: &[f64]) -> f64 {

@@ -6,6 +6,7 @@
 //! contains the font, so no fonts need to be installed.
 
 mod axes;
+mod box_edges;
 mod chart;
 mod colouring;
 mod convergence;
@@ -18,6 +19,7 @@ mod particles;
 mod player;
 pub mod png;
 mod run_report;
+mod segments;
 mod svg;
 mod table;
 mod view;

@@ -1,12 +1,14 @@
 //! The particles of a snapshot over the background grid, coloured by a field.
 
 use super::axes::{AXIS_NAME, Axes, LABEL, TICK_LABELS, Ticks, extremes, range};
+use super::box_edges::{self, corner};
 use super::chart::Heading;
 use super::colouring::Colouring;
 use super::facets::Facets;
 use super::neighbours::Neighbours;
 use super::palette::{BLACK, BLUE, GREY, LIGHT, viridis};
-use super::svg::{Anchor, Point, Svg, width};
+use super::segments;
+use super::svg::{Anchor, Svg, width};
 use super::view::Directions;
 use crate::output::history::AXES;
 use crate::output::moved_outlines::MAX_CELLS;
@@ -50,7 +52,7 @@ pub(super) struct Scene {
     pub run: String,
 }
 
-/// What a picture shows beside the particles, at the same time.
+/// The surfaces beside the particles, at the same time.
 #[derive(Default)]
 pub(super) struct Surfaces {
     /// The surfaces of obstacles.
@@ -98,13 +100,13 @@ pub(super) fn draw(snapshot: &Snapshot, surfaces: &Surfaces, scene: &Scene, colo
             grid(&mut svg, snapshot, &axes, [right, up], scale);
             axes.draw(&mut svg, [&ticks[0], &ticks[1]], [AXES[right], AXES[up]], false);
         }
-        None => labels = edges(&mut svg, scene, &axes),
+        None => labels = box_edges::draw(&mut svg, &scene.directions, scene.bounds, &axes),
     }
     match (&surfaces.obstacles, flat) {
         (Some(obstacles), _) if obstacles.corners == 3 => frame.in_space(&mut svg, &axes, span, Some(obstacles)),
         (Some(obstacles), Some(plane)) if obstacles.corners == 2 => {
             frame.bodies(&mut svg, &axes, span, surfaces.bodies.as_ref());
-            outlines(&mut svg, obstacles, &axes, plane);
+            segments::draw(&mut svg, obstacles, &axes, plane);
         }
         _ => frame.bodies(&mut svg, &axes, span, surfaces.bodies.as_ref()),
     }
@@ -125,11 +127,6 @@ fn widened(range: &mut (f64, f64), scale: f64) -> f64 {
 }
 
 impl Scene {
-    /// A corner of the box, numbered from 0 to 7.
-    fn corner(&self, number: usize) -> [f64; 3] {
-        std::array::from_fn(|k| self.bounds[number >> k & 1][k])
-    }
-
     /// The part of space whose obstacles are drawn, by its lower and upper corner: the box around all particles and [`MARGIN`] around it.
     fn around(&self, snapshot: &Snapshot) -> [[f64; 3]; 2] {
         let [low, high] = self.bounds;
@@ -141,7 +138,7 @@ impl Scene {
     /// Horizontal and vertical extent of the picture: the box and one cell around it. In a plane, the extent ends at the grid.
     fn window(&self, snapshot: &Snapshot) -> ((f64, f64), (f64, f64)) {
         let grid = &snapshot.background;
-        let corners = || (0..8).map(|number| self.directions.project(self.corner(number)));
+        let corners = || (0..8).map(|number| self.directions.project(corner(self.bounds, number)));
         let (x, y) = (extremes(corners().map(|corner| corner.0)), extremes(corners().map(|corner| corner.1)));
         let plane = self.directions.plane();
         // Discs at a wall reach beyond the grid.
@@ -177,124 +174,6 @@ fn grid(svg: &mut Svg, snapshot: &Snapshot, axes: &Axes, plane: [usize; 2], scal
     }
 }
 
-/// Draws the segments of obstacles in the plane, clipped to the drawing.
-fn outlines(svg: &mut Svg, obstacles: &Snapshot, axes: &Axes, [right, up]: [usize; 2]) {
-    for ends in obstacles.points.chunks_exact(2) {
-        let at = |end: [f64; 3]| [end[right], end[up]];
-        if let Some(inside) = clipped([at(ends[0]), at(ends[1])], [axes.x, axes.y]) {
-            svg.line(inside.map(|[x, y]| axes.place((x, y))), BLACK, 1.6);
-        }
-    }
-}
-
-/// The closed lines of outlines of bodies, in the picture. The segments of a line follow each other.
-fn lines(outlines: &Snapshot, axes: &Axes) -> Vec<Vec<Point>> {
-    let mut lines: Vec<Vec<Point>> = Vec::new();
-    let mut end = None;
-    for [from, to] in outlines.points.as_chunks().0 {
-        if end != Some(from) {
-            lines.push(Vec::new());
-        }
-        lines.last_mut().into_iter().for_each(|line| line.push(axes.place((from[0], from[1]))));
-        end = Some(to);
-    }
-    lines
-}
-
-/// The part of a segment in a rectangle, if any (Liang and Barsky, 1984).
-fn clipped([start, end]: [[f64; 2]; 2], ranges: [(f64, f64); 2]) -> Option<[[f64; 2]; 2]> {
-    let (mut first, mut last) = (0.0_f64, 1.0_f64);
-    for (k, (low, high)) in ranges.into_iter().enumerate() {
-        let along = end[k] - start[k];
-        if along == 0.0 {
-            if start[k] < low || start[k] > high {
-                return None;
-            }
-            continue;
-        }
-        let (a, b) = ((low - start[k]) / along, (high - start[k]) / along);
-        (first, last) = (first.max(a.min(b)), last.min(a.max(b)));
-    }
-    let at = |share: f64| [0, 1].map(|k| start[k] + share * (end[k] - start[k]));
-    (first < last).then(|| [at(first), at(last)])
-}
-
-/// Draws the edges of the box behind the particles. Returns labels along one edge of each axis at the outline.
-fn edges(svg: &mut Svg, scene: &Scene, axes: &Axes) -> Vec<Beside> {
-    let place = |number: usize| axes.place(scene.directions.project(scene.corner(number)));
-    let depth = |number: usize| scene.directions.depth(scene.corner(number));
-    let nearest = (0..8).max_by(|&a, &b| depth(a).total_cmp(&depth(b)));
-    let (mut names, mut numbers) = (Vec::new(), Vec::new());
-    for (axis, name) in AXES.into_iter().enumerate() {
-        let starts = || (0..8).filter(|number| number >> axis & 1 == 0);
-        let end = |start: usize| start | 1 << axis;
-        for start in starts().filter(|&start| Some(start) != nearest && Some(end(start)) != nearest) {
-            svg.line([place(start), place(end(start))], LIGHT, 1.0);
-        }
-        // The lowest of the edges that run horizontally, the leftmost of the edges that run vertically.
-        let run = |start: usize| (place(end(start)).0 - place(start).0, place(end(start)).1 - place(start).1);
-        let left = run(0).1.abs() > run(0).0.abs();
-        let outward = |start: &usize| {
-            let (a, b) = (place(*start), place(end(*start)));
-            if left { -(a.0 + b.0) } else { a.1 + b.1 }
-        };
-        let Some(start) = starts().max_by(|a, b| outward(a).total_cmp(&outward(b))) else { continue };
-        let (from, to) = (place(start), place(end(start)));
-        svg.line([from, to], GREY, 1.0);
-        let ends = (scene.bounds[0][axis], scene.bounds[1][axis]);
-        let length = (to.0 - from.0).hypot(to.1 - from.1);
-        let ticks = Ticks::new(ends, ((length / 45.0) as usize).max(2), false);
-        let at = |part: f64| (from.0 + part * (to.0 - from.0), from.1 + part * (to.1 - from.1));
-        let far = if left { ticks.width() + 12.0 } else { 24.0 };
-        names.push(Beside { point: at(0.5), left, far, color: BLACK, text: ticks.name(name) });
-        numbers.extend(ticks.at.iter().map(|&x| {
-            let point = at((x - ends.0) / (ends.1 - ends.0));
-            Beside { point, left, far: 5.0, color: GREY, text: ticks.label(x) }
-        }));
-    }
-    // Where edges meet, labels may overlap. A label that would cover another label is left out.
-    let mut drawn: Vec<Beside> = Vec::new();
-    for text in names.into_iter().chain(numbers) {
-        if drawn.iter().all(|other| !text.covers(other)) {
-            drawn.push(text);
-        }
-    }
-    drawn
-}
-
-/// A text below a point, or at its left, at the distance `far`.
-struct Beside {
-    point: Point,
-    left: bool,
-    far: f64,
-    color: &'static str,
-    text: String,
-}
-
-impl Beside {
-    /// Left, right, upper and lower end of the text, with the space between lines.
-    fn extent(&self) -> [f64; 4] {
-        let ((x, y), wide) = (self.point, width(&self.text, LABEL));
-        match self.left {
-            true => [x - self.far - wide, x - self.far, y - 0.8 * LABEL, y + 0.8 * LABEL],
-            false => [x - wide / 2.0, x + wide / 2.0, y + self.far - 4.0, y + self.far + LABEL + 2.0],
-        }
-    }
-
-    fn covers(&self, other: &Self) -> bool {
-        let ([a, b, c, d], [e, f, g, h]) = (self.extent(), other.extent());
-        a < f + 3.0 && e < b + 3.0 && c < h && g < d
-    }
-
-    fn draw(&self, svg: &mut Svg) {
-        let (x, y) = self.point;
-        match self.left {
-            true => svg.text((x - self.far, y + 0.35 * LABEL), Anchor::End, LABEL, self.color, &self.text),
-            false => svg.text((x, y + self.far + 10.0), Anchor::Middle, LABEL, self.color, &self.text),
-        }
-    }
-}
-
 impl Frame<'_> {
     /// The value that colours a particle.
     fn value(&self, p: usize) -> Option<f64> {
@@ -323,7 +202,7 @@ impl Frame<'_> {
             }
             return;
         };
-        let lines = lines(outlines, axes);
+        let lines = segments::closed_lines(outlines, axes);
         svg.inside(&lines, |svg| {
             for &p in ids.iter().filter(finite) {
                 svg.polygon(neighbours.wide_cell(p).into_iter().map(place), &self.color(p, span));
@@ -476,16 +355,6 @@ mod tests {
         assert_eq!((count(&plane, "<polygon"), count(&plane, "<circle")), (16 + 128, 0));
         assert_eq!((count(&space, "<polygon"), count(&space, "<circle")), (128, 64));
         Ok(())
-    }
-
-    #[test]
-    fn outlines_end_at_the_drawing() {
-        let square = [(0.0, 2.0), (0.0, 1.0)];
-        assert_eq!(clipped([[-1.0, 0.5], [3.0, 0.5]], square), Some([[0.0, 0.5], [2.0, 0.5]]));
-        assert_eq!(clipped([[1.0, -1.0], [1.0, 0.5]], square), Some([[1.0, 0.0], [1.0, 0.5]]));
-        assert_eq!(clipped([[0.5, 0.25], [1.0, 0.5]], square), Some([[0.5, 0.25], [1.0, 0.5]]));
-        assert_eq!(clipped([[-1.0, 0.5], [1.0, 2.5]], square), None);
-        assert_eq!(clipped([[-1.0, 2.0], [3.0, 2.0]], square), None);
     }
 
     #[test]

@@ -76,7 +76,7 @@ struct Accumulated {
     stress: Matrix3<f64>,
 }
 
-/// What a step is given beside its deformation gradients.
+/// The inputs of a step beside its deformation gradients.
 struct StepOfRun {
     time: f64,
     dt: f64,
