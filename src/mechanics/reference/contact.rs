@@ -36,11 +36,14 @@ pub(crate) fn reached_conditions<const D: usize>(
         let cells = cells(at_reset, &field, grid).into_iter();
         cells.flat_map(|(cell, field)| of_cell(grid.index(cell)).into_iter().map(move |one| (field, one))).collect()
     });
-    // The conditions of a cell, and whether a node there is not active yet.
-    let conditions = |&(cell, field): &(u64, u32)| -> Vec<(usize, bool)> {
+    // The conditions of a cell, by condition and field, and whether a node there is not active yet.
+    let conditions = |&(cell, field): &(u64, u32)| -> Vec<((u32, usize), bool)> {
         mutant!("reference: nodes of the first field hold all bodies": field = 0);
-        let is_new = |index| nodes.number(grid.id_in(field, index)).is_none();
-        corners(grid.index(cell)).flat_map(|index| holders(index).map(move |one| (one, is_new(index)))).collect()
+        let of_node = |index| {
+            let is_free = nodes.number(grid.id_in(field, index)).is_none();
+            holders(index).map(move |one| ((field, one), is_free))
+        };
+        corners(grid.index(cell)).flat_map(of_node).collect()
     };
     let keys = cells(present, &field, grid);
     let of_part = |part: &[(u64, u32)]| -> Vec<_> {
@@ -49,8 +52,8 @@ pub(crate) fn reached_conditions<const D: usize>(
     let all = parallel::collect(keys.chunks(CELLS), &of_part).into_iter().flatten();
     // The conditions that are new to a cell, by cell and field.
     let new = all.map(|(key, conditions)| -> ((u64, u32), BTreeSet<usize>) {
-        let is_new = |&(one, is_free): &(usize, bool)| is_free || !held.contains(&(key.1, one));
-        (key, conditions.into_iter().filter(is_new).map(|(one, _)| one).collect())
+        let is_new = |&(one, is_free): &((u32, usize), bool)| is_free || !held.contains(&one);
+        (key, conditions.into_iter().filter(is_new).map(|((_, one), _)| one).collect())
     });
     let new: HashMap<(u64, u32), _> = new.filter(|(_, met)| !met.is_empty()).collect();
     mutant!("reference: no wall that is met resets the grid": { return BTreeSet::new(); });
