@@ -153,7 +153,8 @@ impl<const D: usize> Supports<D> {
     /// let (plain, same_nodes) = Supports::plain(&lme, &grid, &positions)?;
     /// assert_eq!(nodes, same_nodes);
     /// let field = direction::<2>(nodes.len(), 1);
-    /// let apart = fast.values(&field).into_iter().zip(plain.values(&field)).map(|(a, b)| (a - b).norm());
+    /// let (of_fast, of_plain) = (fast.values(&field), plain.values(&field));
+    /// let apart = of_fast.iter().zip(&of_plain).map(|(a, b)| (a - b).norm());
     /// assert!(apart.fold(0.0, f64::max) < 1e-14);
     /// // The fast loop stores functions of one coordinate, not N and ∇N of every node. Particles that share their nodes form groups.
     /// assert!(fast.bytes() < plain.bytes());
