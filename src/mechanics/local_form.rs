@@ -1,9 +1,9 @@
 //! The linearised tangent on the grid: as a bilinear form on cells, from which multigrid makes coarser grids.
 
 use crate::lanes::LANES;
+use crate::mechanics::linearized::{Along, PressureChanges};
 use crate::mechanics::sweep::{At, Group};
 use crate::mechanics::tangent::Tangent;
-use crate::mechanics::terms::{Along, ProductAtPoints};
 use crate::solver::LocalForm;
 use crate::tensor::{Tensor, Vector};
 use rustc_hash::FxHashMap;
@@ -15,17 +15,17 @@ impl<const D: usize> Tangent<'_, D> {
         let (mut form, cells) = self.occupied_cells();
         let tiles = D.pow(4);
         // The form takes gradients in units of 1/h.
-        let factor = self.supports.grid().spacing.recip().powi(2);
+        let factor = self.supports().grid().spacing.recip().powi(2);
         let gradients: Vec<Tensor<f64, D>> = (0..D * D).map(|jl| unit_gradient(jl / D, jl % D)).collect();
-        let products: Vec<Vec<_>> = gradients.iter().map(|gradient| self.products(gradient)).collect();
+        let changes: Vec<_> = gradients.iter().map(|gradient| self.pressure_changes(gradient)).collect();
         // The moduli of the cells of each group: ∂σ_ik/∂L_jl at ((i D + k) D + j) D + l.
-        let moduli = self.supports.map_groups(|group| {
+        let moduli = self.supports().map_groups(|group| {
             let (own, slots) = distinct(&cells[group.number]);
             let mut moduli = vec![0.0; own.len() * tiles];
-            for (jl, products) in products.iter().enumerate() {
+            for (jl, changes) in changes.iter().enumerate() {
                 let (mut unit, mut sums) = (At::<f64, D, D>::zero(), At::<f64, D, D>::zero());
                 unit.gradient[jl / D][jl % D] = [1.0; LANES];
-                products.iter().for_each(|add| add(group, &unit, &mut sums));
+                self.data.add_product_of_group(&self.mass, changes, group, &unit, &mut sums);
                 for (lane, slot) in in_cells(&slots) {
                     for ik in 0..D * D {
                         moduli[slot * tiles + ik * D * D + jl] += factor * sums.gradient[ik / D][ik % D][lane];
@@ -45,12 +45,12 @@ impl<const D: usize> Tangent<'_, D> {
     /// The form without tangent moduli: nodes, occupied cells, and masses. Also the cells of the particles of every group.
     pub(super) fn occupied_cells(&self) -> (LocalForm, Vec<[Option<usize>; LANES]>) {
         let mut form = LocalForm {
-            grid: self.supports.lattice_cells(),
-            aggregated: self.supports.extension().is_some(),
-            degree: self.supports.extension().map_or(0, |extension| extension.degree()),
-            nodes: self.supports.lattice_nodes(),
-            prescribed: self.unknowns.prescribed_mask(self.supports.nodes()),
-            follows: self.unknowns.following_mask(self.supports.nodes()),
+            grid: self.supports().lattice_cells(),
+            aggregated: self.supports().extension().is_some(),
+            degree: self.supports().extension().map_or(0, |extension| extension.degree()),
+            nodes: self.supports().lattice_nodes(),
+            prescribed: self.unknowns.prescribed_mask(self.supports().nodes()),
+            follows: self.unknowns.following_mask(self.supports().nodes()),
             ..LocalForm::default()
         };
         let mut places = FxHashMap::default();
@@ -58,15 +58,14 @@ impl<const D: usize> Tangent<'_, D> {
             let numbers: Vec<usize> = cells.into_iter().map(|cell| cell.add_to(&mut form, &mut places, D)).collect();
             slots.map(|slot| Some(numbers[slot?]))
         };
-        let cells = self.supports.map_groups(|group| self.cells_of(group)).into_iter().map(&mut number).collect();
+        let cells = self.supports().map_groups(|group| self.cells_of(group)).into_iter().map(&mut number).collect();
         form.finish_centres();
         let mut unit = At::<f64, D, D>::zero();
         unit.value[0] = [1.0; LANES];
-        let rest = Tensor::zeros();
-        let products = self.products(&rest);
-        let masses = self.supports.map_groups(|group| {
+        let at_rest = self.pressure_changes(&Tensor::zeros());
+        let masses = self.supports().map_groups(|group| {
             let mut sums = At::<f64, D, D>::zero();
-            products.iter().for_each(|add| add(group, &unit, &mut sums));
+            self.data.add_product_of_group(&self.mass, &at_rest, group, &unit, &mut sums);
             sums.value[0]
         });
         for (masses, cells) in masses.iter().zip(&cells) {
@@ -76,22 +75,21 @@ impl<const D: usize> Tangent<'_, D> {
         (form, cells)
     }
 
-    /// The products of all terms along one gradient, the same at all particles.
-    fn products<'b>(&'b self, gradient: &'b Tensor<f64, D>) -> Vec<ProductAtPoints<'b, D>> {
-        let along = Along::Gradient(gradient);
-        self.terms.iter().filter_map(|term| Some(term.product_at_points(along)?.1)).collect()
+    /// δp of all averaged cells under one gradient, the same at all particles.
+    fn pressure_changes(&self, gradient: &Tensor<f64, D>) -> PressureChanges {
+        self.data.pressure_changes(self.supports(), Along::Gradient(gradient))
     }
 
     /// The cells of the particles of a group. Surface points belong to no cell.
     fn cells_of(&self, group: Group<'_>) -> GroupCells {
-        let (grid, reference) = (self.supports.grid(), self.particles.reference());
+        let (grid, reference) = (self.supports().grid(), self.mass.particles.reference());
         let volume = grid.spacing.powi(D as i32);
         let mut all = GroupCells::default();
         let lanes = group.particles.iter().enumerate();
-        for (lane, &p) in lanes.filter(|(_, p)| self.particles.is_solid(**p as usize)) {
+        for (lane, &p) in lanes.filter(|(_, p)| self.mass.particles.is_solid(**p as usize)) {
             let x = &reference.position[p as usize];
             let within = grid.cell(x).unwrap_or([0; D]);
-            let at = self.supports.in_lattice(self.supports.field_of(self.particles.body[p as usize]), within);
+            let at = self.supports().in_lattice(self.supports().field_of(self.mass.particles.body[p as usize]), within);
             let share = reference.volume(p as usize) / volume;
             let slot = all.slot(at);
             all.slots[lane] = Some(slot);
@@ -107,14 +105,14 @@ impl<const D: usize> Tangent<'_, D> {
     /// For each node, the force at the node under uniform motions of its nodal field along the axes, from the terms at nodes. The other fields
     /// rest, since contact resists relative motions.
     fn blocks_under_uniform_motion(&self) -> Vec<Tensor<f64, D>> {
-        let nodes = self.supports.nodes();
+        let nodes = self.supports().nodes();
         let mut blocks = vec![Tensor::<f64, D>::zeros(); nodes];
-        for (field, k) in (0..self.supports.field_count()).flat_map(|field| (0..D).map(move |k| (field, k))) {
-            let moving = self.supports.nodes_of(field);
+        for (field, k) in (0..self.supports().field_count()).flat_map(|field| (0..D).map(move |k| (field, k))) {
+            let moving = self.supports().nodes_of(field);
             let mut uniform = vec![Vector::<f64, D>::zeros(); nodes];
             uniform[moving.clone()].fill(Vector::from_fn(|i, _| if i == k { 1.0 } else { 0.0 }));
             let mut out = vec![Vector::<f64, D>::zeros(); nodes];
-            self.terms.iter().for_each(|term| term.add_product_at_nodes(&uniform, &mut out));
+            self.data.add_product_at_nodes(&self.mass, &uniform, &mut out);
             blocks[moving.clone()].iter_mut().zip(&out[moving]).for_each(|(block, out)| block.set_column(k, out));
         }
         blocks

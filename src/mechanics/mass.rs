@@ -1,7 +1,8 @@
 //! The mass operator M̃ = (1−ε) M + ε lumped(M), with M_IJ = Σ_p m N_I N_J (eq. 42): product, projection, diagonal.
 
 use crate::aggregation::Followers;
-use crate::mechanics::sweep::{Mode, Supports, Weights};
+use crate::mechanics::sweep::{At, Group, Mode, Supports, Weights};
+use crate::parallel::{self, PART};
 use crate::particles::Particles;
 use crate::pooled::Pooled;
 use crate::solver::{ConjugateGradientSettings, LinearError, LinearOperator, conjugate_gradient};
@@ -53,18 +54,31 @@ impl<const D: usize> Mass<'_, D> {
 
     /// `out += factor M̃ u`
     pub(crate) fn add_product(&self, factor: f64, u: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
-        for ((out, u), m) in out.iter_mut().zip(u).zip(self.lumped) {
-            *out += u * (factor * (self.lumping * m));
-        }
+        self.add_lumped(factor, u, out);
         if self.lumping < 1.0 {
-            let weight = factor * (1.0 - self.lumping);
-            mutant!("mass: the product takes ε for 1 − ε": weight = factor * self.lumping);
+            mutant!("mass: the product takes ε for 1 − ε": factor = factor * self.lumping / (1.0 - self.lumping));
             self.supports.accumulate(Some(u), Mode::VALUE, out, |group, at, sums| {
-                for (lane, &p) in group.particles.iter().enumerate() {
-                    let weight = weight * self.particles.mass[p as usize];
-                    (0..D).for_each(|c| sums.value[c][lane] += weight * at.value[c][lane]);
-                }
+                self.add_consistent(factor, group, at, sums);
             });
+        }
+    }
+
+    /// `out += factor ε m u` at the nodes
+    pub(crate) fn add_lumped(&self, factor: f64, u: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
+        let factor = factor * self.lumping;
+        parallel::for_each(out.chunks_mut(PART).enumerate(), &|(part, out): (usize, &mut [Vector<f64, D>])| {
+            for (node, out) in (part * PART..).zip(out) {
+                *out += u[node] * (factor * self.lumped[node]);
+            }
+        });
+    }
+
+    /// `q += factor (1−ε) m u` at the particles of a group
+    #[inline(always)]
+    pub(crate) fn add_consistent(&self, factor: f64, group: Group<'_>, at: &At<f64, D, D>, sums: &mut At<f64, D, D>) {
+        for (lane, &p) in group.particles.iter().enumerate() {
+            let weight = factor * self.consistent(p as usize);
+            (0..D).for_each(|c| sums.value[c][lane] += weight * at.value[c][lane]);
         }
     }
 

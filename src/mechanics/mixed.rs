@@ -20,8 +20,8 @@
 //! A contains π, but no volumetric stiffness. The unknown of a cell is the length κ h/G (Θ − 1), and its residual is the force G/h r_v. So the
 //! norm of the residual weighs both equations alike, and loose solves do not spoil the pressures.
 
+use crate::mechanics::linearized::MixedCell;
 use crate::mechanics::tangent::Tangent;
-use crate::mechanics::terms::{MixedCell, MixedCells};
 use crate::pooled::Pooled;
 use crate::solver::{LinearOperator, Linearization, PressureCells, SaddlePoint};
 use crate::tensor::{Tensor, Vector, inverse};
@@ -34,12 +34,12 @@ pub(crate) struct MixedTangent<'a, const D: usize> {
 
 impl<const D: usize> MixedTangent<'_, D> {
     fn cells(&self) -> &[MixedCell<D>] {
-        self.tangent.mixed_cells().map_or(&[], MixedCells::cells)
+        self.tangent.mixed_cells().and_then(|rows| rows.mixed.as_deref()).unwrap_or_default()
     }
 
     /// The number of entries of a nodal field.
     fn nodal(&self) -> usize {
-        D * self.tangent.supports.nodes()
+        D * self.tangent.supports().nodes()
     }
 
     /// δp of every cell per unit of its unknown.
@@ -65,8 +65,8 @@ impl<const D: usize> LinearOperator for MixedTangent<'_, D> {
 
 impl<const D: usize> MixedTangent<'_, D> {
     /// B_c K_II⁻¹ B_cᵀ of every cell, with the diagonal blocks K_II.
-    fn softness(&self) -> Vec<f64> {
-        let Tangent { unknowns, supports, .. } = &self.tangent;
+    fn compliance(&self) -> Vec<f64> {
+        let (unknowns, supports) = (&self.tangent.unknowns, self.tangent.supports());
         let held = unknowns.prescribed_mask(supports.nodes());
         let mut blocks = self.tangent.diagonal_blocks();
         for (node, block) in blocks.iter_mut().enumerate() {
@@ -76,7 +76,7 @@ impl<const D: usize> MixedTangent<'_, D> {
             *block = Tensor::from_fn(|i, k| if finite && free(i) && free(k) { inverted[(i, k)] } else { 0.0 });
         }
         let functions = |particle| unknowns.functions(supports, particle);
-        self.tangent.mixed_cells().map_or_else(Vec::new, |cells| cells.softness(&functions, &blocks))
+        self.tangent.mixed_cells().map_or_else(Vec::new, |rows| rows.compliance(&functions, &blocks))
     }
 
     /// A u + Bᵀ p
@@ -103,9 +103,11 @@ impl<const D: usize> SaddlePoint for MixedTangent<'_, D> {
 
     fn volume_changes(&self, u: &[f64], v: &mut [f64]) {
         let u: &[Vector<f64, D>] = bytemuck::cast_slice(u);
-        let extended = self.tangent.unknowns.extended_in(self.tangent.supports.pool(), u);
+        let extended = self.tangent.unknowns.extended_in(self.tangent.supports().pool(), u);
         match self.tangent.mixed_cells() {
-            Some(cells) => v.copy_from_slice(&cells.volume_changes(extended.as_deref().unwrap_or(u))),
+            Some(rows) => {
+                v.copy_from_slice(&rows.volume_changes(self.tangent.supports(), extended.as_deref().unwrap_or(u)));
+            }
             None => v.fill(0.0),
         }
     }
@@ -115,10 +117,10 @@ impl<const D: usize> SaddlePoint for MixedTangent<'_, D> {
     }
 
     fn cells(&self) -> PressureCells {
-        let (supports, grid) = (self.tangent.supports, self.tangent.supports.grid());
+        let (supports, grid) = (self.tangent.supports(), self.tangent.supports().grid());
         let mut all = PressureCells {
             occupied: self.tangent.occupied_cells().0,
-            softness: self.softness(),
+            compliance: self.compliance(),
             inertia: self.tangent.has_inertia,
             ..PressureCells::default()
         };
@@ -129,11 +131,11 @@ impl<const D: usize> SaddlePoint for MixedTangent<'_, D> {
             all.index.push(index);
             all.centroid.push(std::array::from_fn(|k| if k < D { local(k) + shift(k) } else { 0.0 }));
             // The form takes gradients in units of 1/h.
-            all.pull.extend((cell.pull / grid.spacing).iter());
+            all.volume_gradient.extend((cell.volume_gradient / grid.spacing).iter());
             all.volume.push(cell.volume);
             all.shear.push(cell.scale.shear);
             all.stiffness.push(cell.stiffness);
-            all.augmented.push(cell.augmented);
+            all.augmentation.push(cell.augmentation);
             all.unit.push(cell.reference_volume * cell.scale.dilatation);
             all.weight.push(cell.scale.force);
         }

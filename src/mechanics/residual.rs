@@ -5,32 +5,17 @@
 
 use crate::material::Law;
 use crate::mechanics::constitutive::Part;
-use crate::mechanics::loads::{Loads, PrescribedDof, Pressing};
+use crate::mechanics::loads::PrescribedDof;
 use crate::mechanics::sweep::{Mode, Number, Weights};
+use crate::mechanics::symmetry::Unsymmetric;
 use crate::mechanics::terms::{Piece, Role, Step, Terms};
 use crate::mechanics::trial::Trial;
 use crate::mechanics::unknowns::Unknowns;
-use crate::particles::Body;
 use crate::pooled::Pooled;
 use crate::solver::{Stop, vector};
 use crate::tensor::Vector;
 
 pub use crate::mechanics::constitutive::{Inadmissible, compose};
-
-/// The reason why tangents are unsymmetric; `None` if they are symmetric.
-pub(crate) fn unsymmetric<const D: usize, L: Law>(bodies: &[Body<L>], loads: &Loads<D>) -> Option<&'static str> {
-    if loads.surface.iter().any(|load| matches!(load.pressing, Pressing::Pressure(_))) {
-        return Some("pressures that follow a surface make the tangent unsymmetric");
-    }
-    if loads.contacts.have_friction() {
-        return Some("friction makes the tangent unsymmetric");
-    }
-    if loads.contacts.has_free_obstacle() {
-        return Some("an obstacle that moves freely makes the tangent unsymmetric");
-    }
-    let law = bodies.iter().any(|body| !body.law.is_symmetric());
-    law.then_some("a law makes the tangent unsymmetric")
-}
 
 /// The equilibrium of one step: all data of R(Δφ) except Δφ. Evaluating R never changes the particles.
 ///
@@ -275,7 +260,9 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
 
     /// Whether the tangent is symmetric.
     pub fn is_symmetric(&self) -> bool {
-        !self.mixed && !self.step.alphas.discrete_gradient && unsymmetric(self.step.bodies, self.step.loads).is_none()
+        let Step { alphas, bodies, loads, .. } = self.step;
+        let (mixed, mean_stress) = (self.mixed, alphas.discrete_gradient);
+        Unsymmetric { mixed, mean_stress, ..Unsymmetric::of(bodies, loads) }.reason().is_none()
     }
 
     /// Sets the prescribed degrees of freedom of a field to zero.

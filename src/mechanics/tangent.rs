@@ -3,9 +3,11 @@
 use crate::lanes::LANES;
 use crate::material::Law;
 use crate::mechanics::constitutive::{Form, Laws};
+use crate::mechanics::linearized::{CellRows, Linearized};
+use crate::mechanics::mass::Mass;
 use crate::mechanics::residual::{Equilibrium, Inadmissible};
-use crate::mechanics::sweep::{Group, Mode, Quadratic, Supports};
-use crate::mechanics::terms::{Along, Linearized, MixedCells, Piece};
+use crate::mechanics::sweep::{Group, Quadratic, Supports};
+use crate::mechanics::terms::Piece;
 use crate::mechanics::trial::Trial;
 use crate::mechanics::unknowns::Unknowns;
 use crate::parallel::{self, PART};
@@ -47,14 +49,18 @@ use num_dual::Dual64;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct Tangent<'a, const D: usize> {
-    pub(super) supports: &'a Supports<D>,
+    /// M̃, the particles, and their shape functions.
+    pub(super) mass: Mass<'a, D>,
     pub(super) unknowns: Unknowns<'a, D>,
-    pub(super) particles: &'a Particles<D>,
-    pub(super) terms: Vec<Box<dyn Linearized<D> + 'a>>,
+    pub(super) data: Linearized<D>,
     pub(super) has_inertia: bool,
 }
 
-impl<const D: usize> Tangent<'_, D> {
+impl<'a, const D: usize> Tangent<'a, D> {
+    pub(super) fn supports(&self) -> &'a Supports<D> {
+        self.mass.supports
+    }
+
     /// K u on the free degrees of freedom. `u` must be zero on prescribed degrees of freedom.
     pub fn product(&self, u: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
         self.product_under(u, None, out);
@@ -63,37 +69,28 @@ impl<const D: usize> Tangent<'_, D> {
     /// K u, with given changes of the pressures of averaged cells in place of those that u causes.
     pub(super) fn product_under(&self, u: &[Vector<f64, D>], pressures: Option<&[f64]>, out: &mut [Vector<f64, D>]) {
         parallel::for_each(out.chunks_mut(PART), &|out: &mut [Vector<f64, D>]| out.fill(Vector::zeros()));
-        let extended = self.unknowns.extended_in(self.supports.pool(), u);
-        let u = extended.as_deref().unwrap_or(u);
-        self.terms.iter().for_each(|term| term.add_product_at_nodes(u, out));
-        let (modes, all): (Vec<_>, Vec<_>) =
-            self.terms.iter().filter_map(|term| term.product_at_points(Along::Field(u, pressures))).unzip();
-        if let Some(mode) = modes.into_iter().reduce(Mode::and) {
-            self.supports.accumulate(Some(u), mode, out, |group, at, sums| {
-                all.iter().for_each(|add| add(group, at, sums));
-            });
-        }
+        let extended = self.unknowns.extended_in(self.supports().pool(), u);
+        self.data.add_product(&self.mass, extended.as_deref().unwrap_or(u), pressures, out);
         mutant!("unknowns: forces stay at nodes that follow": { return self.unknowns.clear_prescribed(out); });
         self.unknowns.followers.restrict(out);
         self.unknowns.clear_prescribed(out);
     }
 
     /// The averaged cells whose dilatation is an unknown of its own.
-    pub(super) fn mixed_cells(&self) -> Option<&dyn MixedCells<D>> {
-        self.terms.iter().find_map(|term| term.mixed())
+    pub(super) fn mixed_cells(&self) -> Option<&CellRows<D>> {
+        self.data.mixed()
     }
 
     /// K_II of every active node. Values that are prescribed or follow inner nodes have the row and column of the identity.
     pub fn diagonal_blocks(&self) -> Pooled<Tensor<f64, D>> {
-        let mut blocks: Pooled<Tensor<f64, D>> = self.supports.field();
-        self.terms.iter().for_each(|term| term.add_blocks_at_nodes(&mut blocks));
+        let mut blocks: Pooled<Tensor<f64, D>> = self.supports().field();
+        self.data.add_blocks_at_nodes(&self.mass, &mut blocks);
         self.unknowns.restrict_blocks(&mut blocks);
-        let functions = |particle| self.unknowns.functions(self.supports, particle);
-        self.terms.iter().for_each(|term| term.add_blocks_of_functions(&functions, &mut blocks));
-        let all: Vec<_> = self.terms.iter().filter_map(|term| term.blocks_at_points()).collect();
-        if !all.is_empty() {
-            let quadratic = |group: Group<'_>, form: &mut Quadratic| all.iter().for_each(|add| add(group, form));
-            self.supports.blocks(&mut blocks, &quadratic);
+        let functions = |particle| self.unknowns.functions(self.supports(), particle);
+        self.data.add_blocks_of_functions(&functions, &mut blocks);
+        if self.data.has_quadratic(&self.mass) {
+            let quadratic = |group: Group<'_>, form: &mut Quadratic| self.data.add_quadratic(&self.mass, group, form);
+            self.supports().blocks(&mut blocks, &quadratic);
             self.add_followers(&quadratic, &mut blocks);
         }
         self.unknowns.finish_blocks(&mut blocks);
@@ -106,19 +103,19 @@ impl<const D: usize> Tangent<'_, D> {
         if self.unknowns.followers.is_empty() {
             return;
         }
-        let reached = self.unknowns.reached(self.supports);
+        let reached = self.unknowns.reached(self.supports());
         let corrections = |group: Group<'_>| {
             let mut added = Vec::new();
             if group.particles.iter().any(|&p| reached[p as usize]) {
                 let mut form = Quadratic::zero();
                 quadratic(group, &mut form);
                 for (lane, &p) in group.particles.iter().enumerate().filter(|(_, p)| reached[**p as usize]) {
-                    self.unknowns.add_followers(self.supports, p as usize, &form, lane, &mut added);
+                    self.unknowns.add_followers(self.supports(), p as usize, &form, lane, &mut added);
                 }
             }
             added
         };
-        let added = self.supports.map_groups(corrections);
+        let added = self.supports().map_groups(corrections);
         added.into_iter().flatten().for_each(|(node, block)| blocks[node] += block);
     }
 }
@@ -152,10 +149,9 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
         piece: Option<Piece>,
         at: Trial<'_, f64, D>,
     ) -> Result<Tangent<'_, D>, Inadmissible> {
-        let terms = self.terms.linearize(piece, Trial { dphi: &self.unknowns.extended(at.dphi), ..at })?;
-        let (supports, particles) = (self.step.supports, self.step.particles);
+        let data = self.terms.linearize(piece, Trial { dphi: &self.unknowns.extended(at.dphi), ..at })?;
         let has_inertia = !self.step.nodal.is_static();
-        Ok(Tangent { supports, unknowns: self.unknowns.clone(), particles, terms, has_inertia })
+        Ok(Tangent { mass: self.step.mass(), unknowns: self.unknowns.clone(), data, has_inertia })
     }
 
     /// A piece of K u by dual numbers: the derivative of the same piece of the residual, through the same transfer loop.

@@ -49,6 +49,7 @@ use crate::material::{self, Law, Material};
 use crate::mechanics::loads::Rayleigh;
 use crate::mechanics::reference::GridReset;
 use crate::mechanics::schemes::Parameters;
+use crate::mechanics::symmetry::Unsymmetric;
 use crate::shape::Layout;
 use crate::simulation::InitialGuess;
 use schemars::JsonSchema;
@@ -219,7 +220,7 @@ impl Scene {
         if let Some(initial) = &self.initial_velocity {
             self.check_initial_velocity(initial, &mut problems, dimension);
         }
-        self.solver.check(&mut problems, self.unsymmetric());
+        self.solver.check(&mut problems, self.unsymmetric().reason());
         self.output.check(&mut problems, &self.bodies, &self.grid);
         if !self.time.scheme().has_inertia() {
             self.refuse_inertia(&mut problems);
@@ -238,15 +239,20 @@ impl Scene {
         self.bodies.iter().filter_map(|body| body.material.law(&mut Problems::default(), ""))
     }
 
-    /// The cause of an unsymmetric tangent; `None` if the tangent is symmetric.
-    fn unsymmetric(&self) -> Option<&'static str> {
-        let has_friction = self.laws().any(|law| !law.is_symmetric());
-        let friction = has_friction.then_some("a law with friction makes");
-        let rough =
-            self.obstacles.iter().map(|obstacle| obstacle.friction).chain(self.contact.iter().map(|one| one.friction));
-        let friction = friction.or(rough.fold(0.0, f64::max).gt(&0.0).then_some("contact with friction makes"));
-        let mean = (self.time.scheme() == Parameters::EnergyMomentum).then_some("the mean stress of a step makes");
-        if self.pressures.is_empty() { friction.or(mean) } else { Some("pressures make") }
+    /// What the keys of the scene say of the symmetry of the tangent.
+    fn unsymmetric(&self) -> Unsymmetric {
+        let of_obstacles = self.obstacles.iter().map(|obstacle| obstacle.friction);
+        let mut frictions = of_obstacles.chain(self.contact.iter().map(|contact| contact.friction));
+        Unsymmetric {
+            path: self.time.scheme() == Parameters::ArcLength,
+            mean_stress: self.time.scheme() == Parameters::EnergyMomentum,
+            // A scene that asks for conjugate gradients gets the displacement form.
+            mixed: false,
+            pressure: !self.pressures.is_empty(),
+            friction: frictions.any(|friction| friction > 0.0),
+            free_obstacle: self.obstacles.iter().any(|obstacle| obstacle.free.is_some()),
+            law: self.laws().any(|law| !law.is_symmetric()),
+        }
     }
 
     /// Refuses keys that have a meaning only with inertia.

@@ -71,7 +71,7 @@ impl Default for Krylov {
 }
 
 impl Solver {
-    /// `unsymmetric` is the cause of an unsymmetric tangent, if there is one.
+    /// `unsymmetric` is the reason why the tangent is unsymmetric, if it is.
     pub(super) fn check(&self, problems: &mut Problems, unsymmetric: Option<&str>) {
         problems.between("solver.newton.tolerance", self.newton.tolerance, 1e-15, 0.1);
         problems.whole("solver.newton.max_iterations", self.newton.max_iterations, 1, 1000);
@@ -81,7 +81,7 @@ impl Solver {
             Method::Automatic => {}
             Method::ConjugateGradient => {
                 let why = unsymmetric.unwrap_or_default();
-                let allowed = format_args!("{why} the tangent unsymmetric: use {{\"gmres\": {{}}}}");
+                let allowed = format_args!("{why}: use {{\"gmres\": {{}}}}");
                 problems.require(unsymmetric.is_none(), "solver.krylov.method", "\"conjugate_gradient\"", allowed);
             }
         }

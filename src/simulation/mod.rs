@@ -31,9 +31,9 @@ use crate::grid::Grid;
 use crate::material::{DISSIPATED, Law, Material, internal_variable};
 use crate::mechanics::loads::Loads;
 use crate::mechanics::path::Path;
-use crate::mechanics::residual::unsymmetric;
 use crate::mechanics::schemes::Alphas;
 use crate::mechanics::sweep::{Fields, Points, Supports};
+use crate::mechanics::symmetry::Unsymmetric;
 use crate::mechanics::transfer::Nodal;
 use crate::mechanics::unknowns::Unknowns;
 use crate::parallel::{self, PART};
@@ -219,16 +219,13 @@ impl<const D: usize, L: Law, A> Simulation<D, L, A> {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn krylov(&self) -> (Krylov, &'static str) {
-        let mut unsymmetric = unsymmetric(&self.bodies, &self.loads);
-        if self.is_mixed() {
-            unsymmetric = Some("the dilatations of averaged cells are unknowns, too");
-        }
-        if self.has_mean_stress() {
-            unsymmetric = Some("the mean stress of a step makes the tangent unsymmetric");
-        }
-        if self.settings.scheme.follows_path() {
-            unsymmetric = Some("on a path of equilibria, the load is unknown too");
-        }
+        let unsymmetric = Unsymmetric {
+            path: self.settings.scheme.follows_path(),
+            mean_stress: self.has_mean_stress(),
+            mixed: self.is_mixed(),
+            ..Unsymmetric::of(&self.bodies, &self.loads)
+        };
+        let unsymmetric = unsymmetric.reason();
         let asked = self.settings.newton.krylov;
         let why = match asked {
             Krylov::Automatic => unsymmetric.unwrap_or("the tangent is symmetric"),

@@ -356,7 +356,7 @@ fn flow_has_the_same_bits_for_any_threads_and_after_a_restart() -> Result<(), Fa
 fn conjugate_gradients_are_refused_where_a_law_makes_the_tangent_unsymmetric() -> Result<(), Failure> {
     let method = r#"solver.krylov.method="conjugate_gradient""#;
     let refused = membrane(SOIL, 4, &[method]).err().ok_or("friction")?.to_string();
-    assert!(refused.contains("friction") && refused.contains("gmres"), "{refused}");
+    assert!(refused.contains("a law makes") && refused.contains("gmres"), "{refused}");
     assert!(membrane(METAL, 4, &[method]).is_ok());
     Ok(())
 }

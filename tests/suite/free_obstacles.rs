@@ -286,4 +286,8 @@ fn wrong_free_obstacles_are_refused() {
     ] {
         assert_refused(&with(flying(), &[(pointer, value)]).to_string(), path, words);
     }
+    let conjugate =
+        [("/obstacles/0/friction", json!(0)), ("/solver", json!({ "krylov": { "method": "conjugate_gradient" } }))];
+    let words = &["moves freely", "unsymmetric", "gmres"];
+    assert_refused(&with(flying(), &conjugate).to_string(), "solver.krylov.method", words);
 }

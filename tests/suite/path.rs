@@ -97,6 +97,8 @@ fn what_a_path_cannot_have_is_refused() -> Result<(), Failure> {
         let words = "for dead loads, walls at rest and a grid that is kept";
         assert!(error.contains(path) && error.contains(words), "{key}: {error}");
     }
+    let conjugate = toggle(&[r#"solver.krylov.method="conjugate_gradient""#]).err().ok_or("built")?.to_string();
+    assert!(["solver.krylov.method", "the load is unknown", "gmres"].iter().all(|word| conjugate.contains(word)));
     // A table of zeros is a wall at rest.
     toggle(&[r#"boundary={"left":{"displacement":[[0,[0,0]]]}}"#])?;
     Ok(())

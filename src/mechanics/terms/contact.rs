@@ -1,19 +1,19 @@
 //! Contact with obstacles and between bodies, −Σ_Γ t A N_I with the traction t of [`contact`](crate::mechanics::contact). Without friction it has a
 //! potential. Points that slide have none, and their tangent is not symmetric.
 
-use super::term::{FunctionsAt, Linearized, LinearizedTerm, Step, Sum, Term, summed};
+use super::term::{Step, Sum, Term, summed};
 use crate::material::Law;
 use crate::mechanics::constitutive::{Inadmissible, Part};
 use crate::mechanics::contact::{
-    Carrier, ContactPoint, FreeBalance, FreeMotion, FreePoint, Surroundings, Touching, contact_modulus,
-    obstacle_points, pair_points, points_on,
+    Carrier, ContactPoint, FreeBalance, FreeMotion, Surroundings, Touching, contact_modulus, obstacle_points,
+    pair_points, points_on,
 };
+use crate::mechanics::linearized::{ContactRow, ContactRows, Linearized};
 use crate::mechanics::loads::{Obstacle, Pose, RigidBody};
-use crate::mechanics::sweep::{Number, Supports};
+use crate::mechanics::sweep::Number;
 use crate::mechanics::trial::Trial;
 use crate::particles::Body;
-use crate::tensor::{Tensor, Vector};
-use std::collections::BTreeMap;
+use crate::tensor::Vector;
 
 /// The forces of all contacts.
 pub(crate) struct ContactForce<'a, const D: usize, L> {
@@ -142,7 +142,7 @@ impl<const D: usize, L: Law> Term<D> for ContactForce<'_, D, L> {
     /// The gap changes by the rounding of positions.
     fn add_sensitivity(&self, dphi: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) -> Result<(), Inadmissible> {
         let (supports, reference) = (self.step.supports, self.step.particles.reference().position);
-        for LinearizedPoint { carriers, tangent, .. } in self.linearized(dphi) {
+        for ContactRow { carriers, tangent, .. } in self.linearized(dphi) {
             let size = |one: &Carrier<D>| {
                 let x = reference[one.particle].abs() + supports.value_at(one.particle, dphi).abs();
                 x * one.share.abs()
@@ -156,15 +156,20 @@ impl<const D: usize, L: Law> Term<D> for ContactForce<'_, D, L> {
         Ok(())
     }
 
-    fn linearize(&self, Trial { dphi, .. }: Trial<'_, f64, D>, _: Part) -> LinearizedTerm<'_, D> {
+    fn linearize(
+        &self,
+        Trial { dphi, .. }: Trial<'_, f64, D>,
+        _: Part,
+        into: &mut Linearized<D>,
+    ) -> Result<(), Inadmissible> {
         let Step { loads, supports, .. } = self.step;
-        let obstacles = loads.contacts.obstacles.len();
-        Ok(vec![Box::new(LinearizedContact::new(self.linearized(dphi), obstacles, supports))])
+        into.contacts = ContactRows::new(self.linearized(dphi), loads.contacts.obstacles.len(), supports);
+        Ok(())
     }
 }
 
 impl<const D: usize, L: Law> ContactForce<'_, D, L> {
-    fn linearized(&self, dphi: &[Vector<f64, D>]) -> Vec<LinearizedPoint<D>> {
+    fn linearized(&self, dphi: &[Vector<f64, D>]) -> Vec<ContactRow<D>> {
         let contacts = &self.step.loads.contacts;
         let motions = self.free_motions(dphi);
         let points = self.contact_points_with(&motions, dphi);
@@ -178,79 +183,8 @@ impl<const D: usize, L: Law> ContactForce<'_, D, L> {
             mutant!("contact: the tangent does not turn with the obstacle": tangent = one.law.tangent(&one.y) * one.area);
             let on_free = on_free(one);
             mutant!("free obstacles: the tangent holds them": on_free = None);
-            LinearizedPoint { carriers: one.carriers.clone(), tangent, on_free }
+            ContactRow { carriers: one.carriers.clone(), tangent, on_free }
         };
         points.iter().map(linearize).collect()
-    }
-}
-
-struct LinearizedContact<const D: usize> {
-    points: Vec<LinearizedPoint<D>>,
-    /// For each point, the nodes that move it and their weights.
-    weights: Vec<Vec<(usize, f64)>>,
-    /// The number of obstacles.
-    obstacles: usize,
-}
-
-/// A point in contact, linearised.
-struct LinearizedPoint<const D: usize> {
-    carriers: Vec<Carrier<D>>,
-    /// −∂f/∂x of the force, at fixed poses of all obstacles.
-    tangent: Tensor<f64, D>,
-    /// The number of the free obstacle that the point touches, and how both depend on each other.
-    on_free: Option<(usize, FreePoint<D>)>,
-}
-
-impl<const D: usize> LinearizedContact<D> {
-    fn new(points: Vec<LinearizedPoint<D>>, obstacles: usize, supports: &Supports<D>) -> Self {
-        let of = |carrier: &Carrier<D>| {
-            carrier.weights(supports).map(|(node, n)| (node, carrier.share * n)).collect::<Vec<_>>()
-        };
-        let weights = points.iter().map(|point| point.carriers.iter().flat_map(of).collect()).collect();
-        Self { points, weights, obstacles }
-    }
-}
-
-impl<const D: usize> Linearized<D> for LinearizedContact<D> {
-    fn add_product_at_nodes(&self, u: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
-        let moved =
-            |weights: &[(usize, f64)]| weights.iter().fold(Vector::zeros(), |sum, &(node, n)| sum + u[node] * n);
-        // δq of the free obstacles
-        let mut motions = vec![Vector::<f64, 6>::zeros(); self.obstacles];
-        for (point, weights) in self.points.iter().zip(&self.weights) {
-            if let Some((obstacle, free)) = &point.on_free {
-                motions[*obstacle] += free.motion * moved(weights);
-            }
-        }
-        for (LinearizedPoint { tangent, on_free, .. }, weights) in self.points.iter().zip(&self.weights) {
-            let mut force = tangent * moved(weights);
-            if let Some((obstacle, free)) = on_free {
-                force -= free.of_motion * motions[*obstacle];
-            }
-            weights.iter().for_each(|&(node, n)| out[node] += force * n);
-        }
-    }
-
-    /// W_I² K, with the sum W_I over all places that the node moves. A free obstacle subtracts (Σ W_I ∂f/∂q) (Σ ∂q/∂x W_I).
-    fn add_blocks_of_functions(&self, functions: &FunctionsAt<'_, D>, blocks: &mut [Tensor<f64, D>]) {
-        let mut through: BTreeMap<(usize, usize), FreePoint<D>> = BTreeMap::new();
-        for LinearizedPoint { carriers, tangent, on_free } in &self.points {
-            let mut of_node: BTreeMap<usize, [f64; D]> = BTreeMap::new();
-            for Carrier { particle, share, offset } in carriers {
-                for (node, function) in functions(*particle) {
-                    let sum = of_node.entry(node).or_insert([0.0; D]);
-                    (0..D).for_each(|i| sum[i] += share * (function.value[i] + function.gradient[i].dot(offset)));
-                }
-            }
-            for (node, w) in of_node {
-                blocks[node] += Tensor::from_fn(|i, k| w[i] * tangent[(i, k)] * w[k]);
-                if let Some((obstacle, free)) = on_free {
-                    through.entry((*obstacle, node)).or_insert_with(FreePoint::zero).add(free, &w);
-                }
-            }
-        }
-        for ((_, node), FreePoint { of_motion, motion }) in through {
-            blocks[node] -= of_motion * motion;
-        }
     }
 }

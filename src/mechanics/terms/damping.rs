@@ -2,12 +2,12 @@
 //! rotations. Of a body whose cells average the dilatation, K_n is the material part of W − U(J), and the stiffness of each cell against a change
 //! of its volume. The material part of U(J) is not positive there: nothing holds the J of single particles, and J U' may be much larger than G.
 
-use super::inertia::LinearizedMass;
-use super::mean_dilatation::{LinearizedMean, MeanDilatation};
-use super::stress::{LinearizedStress, Stress};
-use super::term::{Along, Linearized, LinearizedTerm, Role, Step, Sum, Term, summed};
+use super::mean_dilatation::MeanDilatation;
+use super::stress::Stress;
+use super::term::{Role, Step, Sum, Term, summed};
 use crate::material::Law;
 use crate::mechanics::constitutive::{Inadmissible, Part};
+use crate::mechanics::linearized::{CellRows, Linearized, StressRows};
 use crate::mechanics::loads::Rayleigh;
 use crate::mechanics::schemes::Alphas;
 use crate::mechanics::sweep::Number;
@@ -18,25 +18,29 @@ use crate::tensor::Vector;
 
 /// (a M̃ + b K_n) v; absent without inertia.
 pub(crate) struct Damping<'a, const D: usize, L> {
-    rayleigh: Rayleigh,
     step: Step<'a, D, L>,
-    /// K_n; `None` if b = 0 or if a particle has det F ≤ 0. In the second case the stress has no value either, and the step fails there.
-    stiffness: Option<LinearizedStress>,
-    /// The part of K_n that belongs to averaged cells.
-    of_cells: Option<LinearizedMean<'a, D, L>>,
+    /// a M̃ + b K_n; without K_n if a particle has det F ≤ 0. The stress has no value then either, and the step fails there.
+    viscosity: Linearized<D>,
+    failure: Option<Inadmissible>,
 }
 
 impl<'a, const D: usize, L: Law> Damping<'a, D, L> {
     pub(super) fn of(step: &Step<'a, D, L>) -> Option<Self> {
-        let rayleigh = step.loads.damping.filter(|_| !step.nodal.is_static())?;
-        let stiff = (rayleigh.stiffness > 0.0).then(|| Self::stiffness(step));
-        let of_cells = if rayleigh.stiffness > 0.0 { Self::stiffness_of_cells(step) } else { None };
-        Some(Self { rayleigh, step: *step, stiffness: stiff.and_then(Result::ok), of_cells })
+        let Rayleigh { mass, stiffness } = step.loads.damping.filter(|_| !step.nodal.is_static())?;
+        let (mut viscosity, mut failure) = (Linearized { mass, ..Linearized::zero() }, None);
+        if stiffness > 0.0 {
+            match Self::stiffness(step) {
+                Ok(rows) => viscosity.stresses.push(rows.times(stiffness)),
+                Err(error) => failure = Some(error),
+            }
+            viscosity.cells.extend(Self::stiffness_of_cells(step).map(|rows| rows.times(stiffness)));
+        }
+        Some(Self { step: *step, viscosity, failure })
     }
 
     /// The material part of the stiffness at φ_n, the nodal motion since the last grid reset, without U(J) of averaged bodies: the mean stress of
     /// a step without motion lacks U(J), and has the stiffness of the law.
-    fn stiffness(step: &Step<'a, D, L>) -> Result<LinearizedStress, Inadmissible> {
+    fn stiffness(step: &Step<'a, D, L>) -> Result<StressRows, Inadmissible> {
         let motion: Vec<_> = step.nodal.moved(step.supports.nodes()).collect();
         let averages = step.bodies.iter().any(Body::averages);
         mutant!("damping: particles of averaged cells have the stiffness of U(J)": averages = false);
@@ -45,7 +49,7 @@ impl<'a, const D: usize, L: Law> Damping<'a, D, L> {
     }
 
     /// The stiffness of averaged cells against a change of volume at φ_n.
-    fn stiffness_of_cells(step: &Step<'a, D, L>) -> Option<LinearizedMean<'a, D, L>> {
+    fn stiffness_of_cells(step: &Step<'a, D, L>) -> Option<CellRows<D>> {
         mutant!("damping: averaged cells have no stiffness of their own": { return None; });
         let motion: Vec<_> = step.nodal.moved(step.supports.nodes()).collect();
         let alphas = Alphas { discrete_gradient: false, ..step.alphas };
@@ -57,14 +61,7 @@ impl<const D: usize, L: Law> Damping<'_, D, L> {
     /// (a M̃ + b K_n) v
     fn force(&self, v: &[Vector<f64, D>]) -> Vec<Vector<f64, D>> {
         let mut force = vec![Vector::zeros(); v.len()];
-        self.step.mass().add_product(self.rayleigh.mass, v, &mut force);
-        let of_law = self.stiffness.as_ref().and_then(|of| of.product_at_points(Along::Field(v, None)));
-        let of_cells = self.of_cells.as_ref().and_then(|of| of.product_at_points(Along::Field(v, None)));
-        for (mode, add) in of_law.into_iter().chain(of_cells) {
-            let mut of_stiffness = vec![Vector::<f64, D>::zeros(); v.len()];
-            self.step.supports.accumulate(Some(v), mode, &mut of_stiffness, add);
-            force.iter_mut().zip(&of_stiffness).for_each(|(force, more)| *force += more * self.rayleigh.stiffness);
-        }
+        self.viscosity.add_product(&self.step.mass(), v, None, &mut force);
         force
     }
 
@@ -118,18 +115,10 @@ impl<const D: usize, L: Law> Term<D> for Damping<'_, D, L> {
     }
 
     /// α₄ (a M̃ + b K_n)
-    fn linearize(&self, _: Trial<'_, f64, D>, _: Part) -> LinearizedTerm<'_, D> {
-        let Rayleigh { mass, stiffness } = self.rayleigh;
+    fn linearize(&self, _: Trial<'_, f64, D>, _: Part, into: &mut Linearized<D>) -> Result<(), Inadmissible> {
         let a4 = self.step.alphas.a4;
         mutant!("damping: the product has the factor of the acceleration": a4 = self.step.alphas.a1);
-        let of_mass = LinearizedMass { mass: self.step.mass(), factor: a4 * mass };
-        let mut addends: Vec<Box<dyn Linearized<D> + '_>> = vec![Box::new(of_mass)];
-        if stiffness > 0.0 {
-            addends.push(Box::new(Self::stiffness(&self.step)?.times(a4 * stiffness)));
-            if let Some(of_cells) = Self::stiffness_of_cells(&self.step) {
-                addends.push(Box::new(of_cells.times(a4 * stiffness)));
-            }
-        }
-        Ok(addends)
+        into.add_scaled(&self.viscosity, a4);
+        self.failure.map_or(Ok(()), Err)
     }
 }

@@ -22,24 +22,22 @@
 //! a and b differ, so the tangent is not symmetric.
 
 use super::mean_dilatation::State;
-use super::term::{
-    Along, AtPoints, BlocksAtPoints, FunctionsAt, Linearized, LinearizedTerm, ProductAtPoints, Step, Sum, Term,
-};
+use super::term::{AtPoints, Step, Sum, Term};
 use crate::lanes::LANES;
 use crate::material::{Law, NonPositiveJacobian};
-use crate::mechanics::constitutive::{AddTo, Form, GAUSS, Product, ROUND_OFF, add_quadratic, general, product};
-use crate::mechanics::constitutive::{Inadmissible, Part, compose};
+use crate::mechanics::constitutive::{GAUSS, Inadmissible, Part, ROUND_OFF, compose, general};
 use crate::mechanics::dilatation::{Cells, Member};
+use crate::mechanics::linearized::{CellLayout, CellRows, Linearized};
 use crate::mechanics::sweep::{Mode, Number};
 use crate::mechanics::trial::Trial;
-use crate::pooled::Pooled;
 use crate::scalar::Real;
 use crate::tensor::{Deformation, Tensor, Vector, cofactor, cofactor_derivative, identity, scaled, symmetric};
+use std::sync::Arc;
 
 /// The mean pressures of a step; absent without mean dilatation, and in other schemes.
 pub(crate) struct DilatationOfStep<'a, const D: usize, L> {
     step: Step<'a, D, L>,
-    cells: Cells,
+    cells: Arc<Cells>,
     /// Θ − 1 of every cell at t_n.
     before: Vec<f64>,
 }
@@ -101,7 +99,7 @@ impl<'a, const D: usize, L: Law> DilatationOfStep<'a, D, L> {
         if !step.alphas.discrete_gradient {
             return None;
         }
-        let cells = Cells::of(step.particles, step.bodies, step.supports)?;
+        let cells = Arc::new(Cells::of(step.particles, step.bodies, step.supports)?);
         let before = cells.changes_now(step.particles);
         Some(Self { step: *step, cells, before })
     }
@@ -198,27 +196,16 @@ impl<const D: usize, L: Law> Term<D> for DilatationOfStep<'_, D, L> {
         None
     }
 
-    fn linearize(&self, at: Trial<'_, f64, D>, _: Part) -> LinearizedTerm<'_, D> {
-        let supports = self.step.supports;
+    fn linearize(&self, at: Trial<'_, f64, D>, _: Part, into: &mut Linearized<D>) -> Result<(), Inadmissible> {
         let means = self.means(at.dphi);
-        let count = linearized_rows(D);
-        let mut rows = supports.pool().unspecified(supports.groups() * count, [0.0; LANES]);
-        supports.fill_rows(at.dphi, count, &mut rows, |group, at, rows| {
-            rows.fill([0.0; LANES]);
-            for (lane, &p) in group.particles.iter().enumerate() {
-                if let Some(cell) = self.cells.cell(p) {
-                    self.linearize_at(p as usize, &at.lane(lane).1, means[cell].pressure, lane, rows);
-                }
-            }
-        });
+        mutant!("mean dilatation of a step: the product lacks the coupling within a cell": { means.iter_mut().for_each(|mean| mean.stiffness = 0.0); });
         let stiffness = means.iter().map(|mean| mean.stiffness).collect();
-        Ok(vec![Box::new(LinearizedPressures { of: self, rows, stiffness })])
+        let (cells, layout, supports) = (self.cells.clone(), CellLayout::of_step(D), self.step.supports);
+        into.cells.push(CellRows::new(cells, layout, stiffness, supports, at.dphi, |cell, p, g, lane, rows| {
+            self.linearize_at(p, g, means[cell].pressure, lane, rows);
+        }));
+        Ok(())
     }
-}
-
-/// Numbers per particle in the linearised tangent: the local part, a, and b.
-pub(crate) const fn linearized_rows(dimension: usize) -> usize {
-    Form::General.rows(dimension) + 2 * dimension * dimension
 }
 
 impl<const D: usize, L: Law> DilatationOfStep<'_, D, L> {
@@ -240,112 +227,11 @@ impl<const D: usize, L: Law> DilatationOfStep<'_, D, L> {
             }
         }
         let (a, b) = (ends.force() * pull_back, cofactor(&ends.ends[1].f) * pull_back * 2.0);
-        let (of_a, of_b) = rows[Form::General.rows(D)..].split_at_mut(D * D);
+        let (of_a, of_b) = rows[CellLayout::of_step(D).a..].split_at_mut(D * D);
         for i in 0..D {
             for k in 0..D {
                 of_a[i * D + k][lane] = a[(i, k)];
                 of_b[i * D + k][lane] = b[(i, k)];
-            }
-        }
-    }
-}
-
-/// The linearised δσ.
-struct LinearizedPressures<'a, const D: usize, L> {
-    of: &'a DilatationOfStep<'a, D, L>,
-    /// The local part, a, and b.
-    rows: Pooled<[f64; LANES]>,
-    /// k̄
-    stiffness: Vec<f64>,
-}
-
-impl<const D: usize, L: Law> LinearizedPressures<'_, D, L> {
-    /// The local part, a and b of a group.
-    fn of_group(&self, group: usize) -> [&[[f64; LANES]]; 3] {
-        let count = linearized_rows(D);
-        let (local, both) = self.rows[group * count..(group + 1) * count].split_at(Form::General.rows(D));
-        let (a, b) = both.split_at(D * D);
-        [local, a, b]
-    }
-
-    /// a and b of a member.
-    fn of_member(&self, member: &Member) -> [Tensor<f64, D>; 2] {
-        let [_, a, b] = self.of_group(member.slot as usize / LANES);
-        [a, b].map(|rows| Tensor::from_fn(|i, k| rows[i * D + k][member.slot as usize % LANES]))
-    }
-
-    /// δπ̄ of every cell.
-    fn coupling(&self, along: Along<'_, D>) -> Vec<f64> {
-        let volumes: Vec<f64> = match along {
-            Along::Field(u, _) => self.volume_changes(u),
-            Along::Gradient(gradient) => {
-                let sum =
-                    |members: &[Member]| members.iter().map(|member| self.of_member(member)[1].dot(gradient)).sum();
-                self.of.cells.iter().map(|(members, _)| sum(members)).collect()
-            }
-        };
-        volumes.iter().zip(&self.stiffness).map(|(v, k)| k * v).collect()
-    }
-
-    /// δv_{n+1} of every cell.
-    fn volume_changes(&self, u: &[Vector<f64, D>]) -> Vec<f64> {
-        let supports = self.of.step.supports;
-        let mut grown = supports.pool().unspecified(supports.groups(), [0.0; LANES]);
-        supports.fill_rows(u, 1, &mut grown, |group, at, grown| {
-            let [.., b] = self.of_group(group.number);
-            grown[0] = [0.0; LANES];
-            for (b, l) in b.iter().zip(at.gradient.as_flattened()) {
-                (0..LANES).for_each(|lane| grown[0][lane] += b[lane] * l[lane]);
-            }
-        });
-        self.of.cells.sums(&grown)
-    }
-}
-
-impl<const D: usize, L: Law> Linearized<D> for LinearizedPressures<'_, D, L> {
-    fn product_at_points(&self, along: Along<'_, D>) -> Option<(Mode, ProductAtPoints<'_, D>)> {
-        let coupling = self.coupling(along);
-        Some((
-            Mode::GRADIENT,
-            Box::new(move |group, at, sums| {
-                let [local, a, _] = self.of_group(group.number);
-                let (l, out) = (at.gradient.as_flattened(), sums.gradient.as_flattened_mut());
-                let mut changes = [0.0; LANES];
-                for (lane, &p) in group.particles.iter().enumerate() {
-                    changes[lane] = self.of.cells.cell(p).map_or(0.0, |cell| coupling[cell]);
-                    mutant!("mean dilatation of a step: the product lacks the coupling within a cell": { changes[lane] = 0.0; });
-                }
-                product(D, Product { form: Form::General, rows: local, l, out });
-                for (out, a) in sums.gradient.as_flattened_mut().iter_mut().zip(a) {
-                    (0..LANES).for_each(|lane| out[lane] += changes[lane] * a[lane]);
-                }
-            }),
-        ))
-    }
-
-    fn blocks_at_points(&self) -> Option<BlocksAtPoints<'_>> {
-        Some(Box::new(|group, into| {
-            let [rows, ..] = self.of_group(group.number);
-            add_quadratic(D, AddTo { form: Form::General, rows, factor: 1.0, into });
-        }))
-    }
-
-    /// Σ_c k̄ a_I ⊗ b_I with a_I = Σ a ∇_r N_I and b_I = Σ b ∇_r N_I: the contribution of the coupling.
-    fn add_blocks_of_functions(&self, functions: &FunctionsAt<'_, D>, blocks: &mut [Tensor<f64, D>]) {
-        let (mut sums, mut touched) = (vec![[Vector::<f64, D>::zeros(); 2]; blocks.len()], Vec::new());
-        for ((members, _), stiffness) in self.of.cells.iter().zip(&self.stiffness) {
-            for member in members {
-                let both = self.of_member(member);
-                for (node, function) in functions(member.particle as usize) {
-                    for (sum, one) in sums[node].iter_mut().zip(&both) {
-                        *sum += Vector::from_fn(|i, _| (one * function.gradient[i])[i]);
-                    }
-                    touched.push(node);
-                }
-            }
-            for node in touched.drain(..) {
-                let [a, b] = std::mem::replace(&mut sums[node], [Vector::zeros(); 2]);
-                blocks[node] += a * b.transpose() * *stiffness;
             }
         }
     }

@@ -1,17 +1,15 @@
 //! Inertia, M̃ a with a = α₁ (Δφ − Δφ̂): eq. 33 with the sign corrected.
 
-use super::term::{
-    Along, AtPoints, BlocksAtPoints, Linearized, LinearizedTerm, ProductAtPoints, Step, Sum, Term, summed,
-};
+use super::term::{AtPoints, Step, Sum, Term, summed};
 use crate::mechanics::constitutive::{Inadmissible, Part};
+use crate::mechanics::linearized::Linearized;
 use crate::mechanics::mass::Mass;
 use crate::mechanics::schemes::Alphas;
 use crate::mechanics::sweep::{Mode, Number};
 use crate::mechanics::transfer::Nodal;
 use crate::mechanics::trial::Trial;
-use crate::parallel::{self, PART};
 use crate::pooled::Pooled;
-use crate::tensor::{Tensor, Vector, identity, scaled};
+use crate::tensor::{Tensor, Vector};
 
 /// M̃ a; absent without inertia.
 pub(crate) struct Inertia<'a, const D: usize> {
@@ -96,49 +94,8 @@ impl<const D: usize> Term<D> for Inertia<'_, D> {
         }
     }
 
-    fn linearize(&self, _: Trial<'_, f64, D>, _: Part) -> LinearizedTerm<'_, D> {
-        Ok(vec![Box::new(LinearizedMass { mass: self.mass, factor: self.alphas.a1 })])
-    }
-}
-
-/// A multiple of M̃.
-pub(super) struct LinearizedMass<'a, const D: usize> {
-    pub(super) mass: Mass<'a, D>,
-    pub(super) factor: f64,
-}
-
-impl<const D: usize> Linearized<D> for LinearizedMass<'_, D> {
-    fn add_product_at_nodes(&self, u: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
-        let factor = self.factor * self.mass.lumping;
-        parallel::for_each(out.chunks_mut(PART).enumerate(), &|(part, out): (usize, &mut [Vector<f64, D>])| {
-            for (node, out) in (part * PART..).zip(out) {
-                *out += u[node] * (factor * self.mass.lumped[node]);
-            }
-        });
-    }
-
-    fn product_at_points(&self, _: Along<'_, D>) -> Option<(Mode, ProductAtPoints<'_, D>)> {
-        let add: ProductAtPoints<'_, D> = Box::new(|group, at, sums| {
-            for (lane, &p) in group.particles.iter().enumerate() {
-                let weight = self.factor * self.mass.consistent(p as usize);
-                (0..D).for_each(|c| sums.value[c][lane] += weight * at.value[c][lane]);
-            }
-        });
-        (self.mass.lumping < 1.0).then_some((Mode::VALUE, add))
-    }
-
-    fn add_blocks_at_nodes(&self, blocks: &mut [Tensor<f64, D>]) {
-        for (block, m) in blocks.iter_mut().zip(self.mass.lumped) {
-            *block += scaled(&identity(), self.factor * self.mass.lumping * m);
-        }
-    }
-
-    fn blocks_at_points(&self) -> Option<BlocksAtPoints<'_>> {
-        let add: BlocksAtPoints<'_> = Box::new(|group, form| {
-            for (lane, &p) in group.particles.iter().enumerate() {
-                form.mass[lane] += self.factor * self.mass.consistent(p as usize);
-            }
-        });
-        (self.mass.lumping < 1.0).then_some(add)
+    fn linearize(&self, _: Trial<'_, f64, D>, _: Part, into: &mut Linearized<D>) -> Result<(), Inadmissible> {
+        into.mass += self.alphas.a1;
+        Ok(())
     }
 }

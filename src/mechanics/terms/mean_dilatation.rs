@@ -17,18 +17,13 @@
 //! In the mixed form, Θ_c is an unknown of its own, with the residual v − Θ_c V_c ([`mixed`](crate::mechanics::mixed)). In π and k, Θ_c V_c then
 //! stands for v.
 
-use super::term::{
-    Along, AtPoints, BlocksAtPoints, FunctionsAt, Linearized, LinearizedTerm, MixedCell, MixedCells, ProductAtPoints,
-    Step, Sum, Term, summed,
-};
-use crate::lanes::LANES;
+use super::term::{AtPoints, Step, Sum, Term, summed};
 use crate::material::{Law, MaterialState, VolumeResponse};
-use crate::mechanics::constitutive::{AddTo, Form, Product, add_quadratic, product};
-use crate::mechanics::constitutive::{Inadmissible, Part, compose};
+use crate::mechanics::constitutive::{Form, Inadmissible, Part, compose};
 use crate::mechanics::dilatation::{Cells, Member, Scale, total};
+use crate::mechanics::linearized::{CellLayout, CellRows, Linearized, MixedCell};
 use crate::mechanics::sweep::{Mode, Number};
 use crate::mechanics::trial::Trial;
-use crate::pooled::Pooled;
 use crate::scalar::Real;
 use crate::tensor::{Tensor, Vector, cofactor, identity, scaled};
 use std::sync::Arc;
@@ -118,47 +113,71 @@ impl<'a, const D: usize, L: Law> MeanDilatation<'a, D, L> {
     }
 }
 
-impl<'a, const D: usize, L: Law> MeanDilatation<'a, D, L> {
-    /// A, zeros, κ, q, and V₀ J of all particles, where `local` gives κ = V₀ (J π − J T') and q = V₀ (J π − T) from the cell, V₀ J, V₀ and U at J.
+impl<const D: usize, L: Law> MeanDilatation<'_, D, L> {
+    /// The rows of all particles, where `local` gives κ = V₀ (J π − J T') and q = V₀ (J π − T) from the cell, V₀ J, V₀ and U at J. With a = V₀ J A
+    /// in place of A, κ and q are those over (V₀ J)².
     fn rows(
         &self,
         dphi: &[Vector<f64, D>],
+        stiffness: Vec<f64>,
         local: impl Fn(usize, f64, f64, VolumeResponse<f64>) -> [f64; 2] + Sync,
-    ) -> Pooled<[f64; LANES]> {
-        let supports = self.step.supports;
-        let (closed, count) = (Form::Closed.rows(D), linearized_rows(D));
-        let mut rows = supports.pool().unspecified(supports.groups() * count, [0.0; LANES]);
-        supports.fill_rows(dphi, count, &mut rows, |group, at, rows| {
-            rows.fill([0.0; LANES]);
-            for (lane, &p) in group.particles.iter().enumerate() {
-                let Some(cell) = self.cells.cell(p) else { continue };
-                let Local { jacobian, response, a } = self.local(p as usize, &at.lane(lane).1);
-                let volume = self.step.particles.volume[p as usize];
-                let weight = volume * jacobian;
-                for i in 0..D {
-                    for k in 0..D {
-                        rows[i * D + k][lane] = a[(i, k)] / weight;
-                    }
+    ) -> CellRows<D> {
+        let closed = Form::Closed.rows(D);
+        let (cells, layout) = (self.cells.clone(), CellLayout::of_potential(D));
+        CellRows::new(cells, layout, stiffness, self.step.supports, dphi, |cell, p, g, lane, rows| {
+            let Local { jacobian, response, a } = self.local(p, g);
+            for i in 0..D {
+                for k in 0..D {
+                    rows[i * D + k][lane] = a[(i, k)];
                 }
-                let [bulk, q] = local(cell, weight, volume, response);
-                rows[closed - 2][lane] = bulk;
-                rows[closed - 1][lane] = q;
-                rows[closed][lane] = weight;
             }
-        });
-        rows
+            let volume = self.step.particles.volume[p];
+            let weight = volume * jacobian;
+            let per_weight = (weight * weight).recip();
+            let [bulk, q] = local(cell, weight, volume, response);
+            rows[closed - 2][lane] = bulk * per_weight;
+            rows[closed - 1][lane] = q * per_weight;
+        })
     }
 
     /// The stiffness of all cells against a change of their volume, for damping: k̂ (Σ a_q : L_q) a with k̂ = Σ V₀ θ T' / v². It is symmetric and
     /// positive semidefinite.
-    pub(super) fn volumetric_stiffness(&self, dphi: &[Vector<f64, D>]) -> LinearizedMean<'a, D, L> {
+    pub(super) fn volumetric_stiffness(&self, dphi: &[Vector<f64, D>]) -> CellRows<D> {
         let states = self.states(Trial::motion(dphi));
         let volumes = self.cells.iter().map(|(_, volume)| volume);
         let stiffness =
             |(state, volume): (&State<f64>, f64)| state.stiffness + state.pressure / ((1.0 + state.change) * volume);
-        let stiffness = states.iter().zip(volumes).map(stiffness).collect();
-        let rows = self.rows(dphi, |_, _, _, _| [0.0; 2]);
-        LinearizedMean { step: self.step, cells: self.cells.clone(), rows, stiffness, mixed: None }
+        self.rows(dphi, states.iter().zip(volumes).map(stiffness).collect(), |_, _, _, _| [0.0; 2])
+    }
+
+    /// The cells of the mixed form, with γ = k₀/v and k₀ = κ G/(κ + G).
+    fn mixed_cells(&self, states: &[State<f64>], rows: &CellRows<D>) -> Vec<MixedCell<D>> {
+        let Step { particles, supports, .. } = self.step;
+        let (grid, reference) = (supports.grid(), particles.reference());
+        let cell = |(members, reference_volume): (&[Member], f64), state: &State<f64>, scale: &Scale, id: u64| {
+            let volume = (1.0 + state.change) * reference_volume;
+            let (mut volume_gradient, mut centroid) = (Tensor::zeros(), Vector::zeros());
+            for member in members {
+                let p = member.particle as usize;
+                volume_gradient += rows.volume_gradient(member);
+                centroid += reference.position[p] * (reference.volume(p) / reference_volume);
+            }
+            let bulk = (state.stiffness * volume).max(SOFTEST * scale.shear);
+            MixedCell {
+                field: supports.field_of(particles.body[members[0].particle as usize]),
+                index: grid.index(id),
+                centroid,
+                volume,
+                volume_gradient,
+                stiffness: state.stiffness,
+                augmentation: bulk * scale.shear / (bulk + scale.shear) / volume,
+                scale: *scale,
+                reference_volume,
+            }
+        };
+        let cells = &self.cells;
+        let all = cells.iter().zip(states).zip(cells.scales.iter().zip(&cells.ids));
+        all.map(|((members, state), (scale, &id))| cell(members, state, scale, id)).collect()
     }
 
     /// G/h (v − Θ V_c) of every cell in the mixed form, with Θ from its own unknown; empty in the displacement form.
@@ -222,197 +241,19 @@ impl<const D: usize, L: Law> Term<D> for MeanDilatation<'_, D, L> {
         Some(Ok(summed(energies.into_iter().flatten())))
     }
 
-    fn linearize(&self, at: Trial<'_, f64, D>, _: Part) -> LinearizedTerm<'_, D> {
+    fn linearize(&self, at: Trial<'_, f64, D>, _: Part, into: &mut Linearized<D>) -> Result<(), Inadmissible> {
         let states = self.states(at);
-        let rows = self.rows(at.dphi, |cell, weight, volume, response| {
+        let stiffness = states.iter().map(|state| state.stiffness).collect();
+        let mut rows = self.rows(at.dphi, stiffness, |cell, weight, volume, response| {
             let of_mean = weight * states[cell].pressure;
             [of_mean - volume * response.stiffness, of_mean - volume * response.stress]
         });
-        let stiffness: Vec<f64> = states.iter().map(|state| state.stiffness).collect();
-        let mut linearized =
-            LinearizedMean { step: self.step, cells: self.cells.clone(), rows, stiffness, mixed: None };
         if !at.dilatation.is_empty() {
-            let cells = linearized.mixed_cells(&states);
-            linearized.stiffness = cells.iter().map(|cell| cell.augmented).collect();
-            linearized.mixed = Some(cells);
+            let cells = self.mixed_cells(&states, &rows);
+            rows.stiffness = cells.iter().map(|cell| cell.augmentation).collect();
+            rows.mixed = Some(cells);
         }
-        Ok(vec![Box::new(linearized)])
-    }
-}
-
-/// Numbers per particle in the linearised tangent.
-pub(crate) const fn linearized_rows(dimension: usize) -> usize {
-    Form::Closed.rows(dimension) + 1
-}
-
-/// The linearised δσ: `stiffness` couples the particles of a cell, and `rows` is the local part.
-pub(super) struct LinearizedMean<'a, const D: usize, L> {
-    step: Step<'a, D, L>,
-    cells: Arc<Cells>,
-    /// A, zeros, κ, q, and V₀ J.
-    rows: Pooled<[f64; LANES]>,
-    /// k; in the mixed form γ.
-    stiffness: Vec<f64>,
-    /// The cells of the mixed form.
-    mixed: Option<Vec<MixedCell<D>>>,
-}
-
-impl<const D: usize, L: Law> LinearizedMean<'_, D, L> {
-    /// This [`MeanDilatation::volumetric_stiffness`] times a factor.
-    pub(super) fn times(mut self, factor: f64) -> Self {
-        self.stiffness.iter_mut().for_each(|stiffness| *stiffness *= factor);
-        self
-    }
-
-    /// A, zeros, κ and q of a group, and V₀ J.
-    fn of_group(&self, group: usize) -> (&[[f64; LANES]], &[f64; LANES]) {
-        let count = linearized_rows(D);
-        let rows = &self.rows[group * count..(group + 1) * count];
-        (&rows[..count - 1], &rows[count - 1])
-    }
-
-    /// V₀ J A of a member, which is ∂v/∂(∇u).
-    fn pull(&self, member: &Member) -> Tensor<f64, D> {
-        let (group, lane) = (member.slot as usize / LANES, member.slot as usize % LANES);
-        let (rows, weight) = self.of_group(group);
-        Tensor::from_fn(|i, k| rows[i * D + k][lane] * weight[lane])
-    }
-
-    /// The cells of the mixed form, with γ = k₀/v and k₀ = κ G/(κ + G).
-    fn mixed_cells(&self, states: &[State<f64>]) -> Vec<MixedCell<D>> {
-        let Step { particles, supports, .. } = self.step;
-        let (grid, reference) = (supports.grid(), particles.reference());
-        let cell = |(members, reference_volume): (&[Member], f64), state: &State<f64>, scale: &Scale, id: u64| {
-            let volume = (1.0 + state.change) * reference_volume;
-            let (mut pull, mut centroid) = (Tensor::zeros(), Vector::zeros());
-            for member in members {
-                let p = member.particle as usize;
-                pull += self.pull(member);
-                centroid += reference.position[p] * (reference.volume(p) / reference_volume);
-            }
-            let bulk = (state.stiffness * volume).max(SOFTEST * scale.shear);
-            MixedCell {
-                field: supports.field_of(particles.body[members[0].particle as usize]),
-                index: grid.index(id),
-                centroid,
-                volume,
-                pull,
-                stiffness: state.stiffness,
-                augmented: bulk * scale.shear / (bulk + scale.shear) / volume,
-                scale: *scale,
-                reference_volume,
-            }
-        };
-        let cells = &self.cells;
-        let all = cells.iter().zip(states).zip(cells.scales.iter().zip(&cells.ids));
-        all.map(|((members, state), (scale, &id))| cell(members, state, scale, id)).collect()
-    }
-
-    /// δp of every cell: as given, or k δv with δv = Σ V₀ J A : ∇u (γ δv in the mixed form).
-    fn coupling(&self, along: Along<'_, D>) -> Vec<f64> {
-        let volumes = match along {
-            Along::Field(_, Some(pressures)) if self.mixed.is_some() => return pressures.to_vec(),
-            Along::Field(u, _) => self.volume_changes(u),
-            Along::Gradient(gradient) => {
-                let sum = |members: &[Member]| members.iter().map(|member| self.pull(member).dot(gradient)).sum();
-                self.cells.iter().map(|(members, _)| sum(members)).collect()
-            }
-        };
-        volumes.iter().zip(&self.stiffness).map(|(v, k): (&f64, _)| k * v).collect()
-    }
-
-    /// Calls `visit` with each cell, each node that moves it, and b = ∂v/∂u of the node.
-    fn each_pull(
-        &self,
-        functions: &FunctionsAt<'_, D>,
-        nodes: usize,
-        mut visit: impl FnMut(usize, usize, Vector<f64, D>),
-    ) {
-        let (mut sums, mut touched) = (vec![Vector::<f64, D>::zeros(); nodes], Vec::new());
-        for (cell, (members, _)) in self.cells.iter().enumerate() {
-            for member in members {
-                let a = self.pull(member);
-                for (node, function) in functions(member.particle as usize) {
-                    sums[node] += Vector::from_fn(|i, _| (a * function.gradient[i])[i]);
-                    touched.push(node);
-                }
-            }
-            for node in touched.drain(..) {
-                let b = std::mem::replace(&mut sums[node], Vector::zeros());
-                if b.norm_squared() > 0.0 {
-                    visit(cell, node, b);
-                }
-            }
-        }
-    }
-
-    fn volume_changes(&self, u: &[Vector<f64, D>]) -> Vec<f64> {
-        let supports = self.step.supports;
-        let mut grown = supports.pool().unspecified(supports.groups(), [0.0; LANES]);
-        supports.fill_rows(u, 1, &mut grown, |group, at, grown| {
-            let (a, weight) = self.of_group(group.number);
-            let mut sum = [0.0; LANES];
-            for (a, l) in a.iter().zip(at.gradient.as_flattened()) {
-                (0..LANES).for_each(|lane| sum[lane] += a[lane] * l[lane]);
-            }
-            grown[0] = std::array::from_fn(|lane| sum[lane] * weight[lane]);
-        });
-        self.cells.sums(&grown)
-    }
-}
-
-impl<const D: usize, L: Law> MixedCells<D> for LinearizedMean<'_, D, L> {
-    fn volume_changes(&self, u: &[Vector<f64, D>]) -> Vec<f64> {
-        Self::volume_changes(self, u)
-    }
-
-    fn softness(&self, functions: &FunctionsAt<'_, D>, inverse: &[Tensor<f64, D>]) -> Vec<f64> {
-        let mut softness = vec![0.0; self.stiffness.len()];
-        self.each_pull(functions, inverse.len(), |cell, node, b| softness[cell] += b.dot(&(inverse[node] * b)));
-        softness
-    }
-
-    fn cells(&self) -> &[MixedCell<D>] {
-        self.mixed.as_deref().unwrap_or_default()
-    }
-}
-
-impl<const D: usize, L: Law> Linearized<D> for LinearizedMean<'_, D, L> {
-    fn product_at_points(&self, along: Along<'_, D>) -> Option<(Mode, ProductAtPoints<'_, D>)> {
-        let coupling = self.coupling(along);
-        Some((
-            Mode::GRADIENT,
-            Box::new(move |group, at, sums| {
-                let (rows, weight) = self.of_group(group.number);
-                let (l, out) = (at.gradient.as_flattened(), sums.gradient.as_flattened_mut());
-                let mut pulls = [0.0; LANES];
-                for (lane, &p) in group.particles.iter().enumerate() {
-                    pulls[lane] = self.cells.cell(p).map_or(0.0, |cell| coupling[cell] * weight[lane]);
-                    mutant!("mean dilatation: the product lacks the coupling within a cell": { pulls[lane] = 0.0; });
-                }
-                product(D, Product { form: Form::Closed, rows, l, out });
-                for (out, a) in sums.gradient.as_flattened_mut().iter_mut().zip(rows) {
-                    (0..LANES).for_each(|lane| out[lane] += pulls[lane] * a[lane]);
-                }
-            }),
-        ))
-    }
-
-    fn blocks_at_points(&self) -> Option<BlocksAtPoints<'_>> {
-        Some(Box::new(|group, into| {
-            let (rows, _) = self.of_group(group.number);
-            add_quadratic(D, AddTo { form: Form::Closed, rows, factor: 1.0, into });
-        }))
-    }
-
-    /// Σ_c k b_I ⊗ b_I with b_I = ∂v/∂Δφ_I: the contribution of the coupling.
-    fn add_blocks_of_functions(&self, functions: &FunctionsAt<'_, D>, blocks: &mut [Tensor<f64, D>]) {
-        self.each_pull(functions, blocks.len(), |cell, node, b| {
-            blocks[node] += b * b.transpose() * self.stiffness[cell];
-        });
-    }
-
-    fn mixed(&self) -> Option<&dyn MixedCells<D>> {
-        self.mixed.is_some().then_some(self)
+        into.cells.push(rows);
+        Ok(())
     }
 }

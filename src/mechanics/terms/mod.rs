@@ -5,7 +5,7 @@
 //! - its value, for every number type;
 //! - its energy, if it has a potential;
 //! - the size that its round-off is relative to;
-//! - its tangent, linearised at one Δφ: product and diagonal blocks.
+//! - its tangent, linearised at one Δφ, as [data](super::linearized).
 //!
 //! [`Equilibrium`](super::residual::Equilibrium) sums the terms of the list. Plans and checks go through the same list.
 
@@ -22,7 +22,6 @@ mod term;
 
 pub(crate) use contact::{ContactForce, penalties};
 pub(crate) use planned::planned;
-pub(crate) use term::{Along, Linearized, MixedCell, MixedCells, ProductAtPoints};
 pub use term::{AtPoints, Piece, Role, Step, Sum};
 
 use damping::Damping;
@@ -32,11 +31,12 @@ use inertia::Inertia;
 use mean_dilatation::MeanDilatation;
 use pressure::Pressure;
 use stress::Stress;
-use term::{LinearizedTerm, Term};
+use term::Term;
 
 use crate::material::Law;
 use crate::mechanics::constitutive::{Inadmissible, Part};
 use crate::mechanics::dilatation::Cells;
+use crate::mechanics::linearized::{CellLayout, Linearized};
 use crate::mechanics::sweep::{Mode, Number};
 use crate::mechanics::trial::Trial;
 use crate::tensor::Vector;
@@ -71,11 +71,7 @@ macro_rules! of_term {
 
 /// Numbers per particle in the linearised tangent of mean dilatation, also of the mean stress of a step.
 pub(crate) const fn dilatation_rows(dimension: usize, discrete_gradient: bool) -> usize {
-    if discrete_gradient {
-        dilatation_of_step::linearized_rows(dimension)
-    } else {
-        mean_dilatation::linearized_rows(dimension)
-    }
+    if discrete_gradient { CellLayout::of_step(dimension).count } else { CellLayout::of_potential(dimension).count }
 }
 
 /// The terms of one step.
@@ -186,12 +182,12 @@ impl<'a, const D: usize, L: Law> Terms<'a, D, L> {
     }
 
     /// Linearises all terms, or one piece.
-    pub(crate) fn linearize(&self, piece: Option<Piece>, at: Trial<'_, f64, D>) -> LinearizedTerm<'_, D> {
+    pub(crate) fn linearize(&self, piece: Option<Piece>, at: Trial<'_, f64, D>) -> Result<Linearized<D>, Inadmissible> {
         let part = piece.map_or(Part::Whole, |piece| piece.part);
-        let mut all = Vec::new();
+        let mut linearized = Linearized::zero();
         for any in self.picked(|name, _| piece.is_none_or(|piece| piece.term == name)) {
-            all.extend(of_term!(any, term => term.linearize(at, part))?);
+            of_term!(any, term => term.linearize(at, part, &mut linearized))?;
         }
-        Ok(all)
+        Ok(linearized)
     }
 }

@@ -1,16 +1,13 @@
 //! The internal force Σ_p V₀ F S ∇N (eq. 17), and its tangent, geometric and material (eqs. 34, 38).
 
-use super::term::{
-    Along, AtPoints, BlocksAtPoints, Linearized, LinearizedTerm, ProductAtPoints, Step, Sum, Term, summed,
-};
+use super::term::{AtPoints, Step, Sum, Term, summed};
 use crate::lanes::LANES;
 use crate::material::Law;
-use crate::mechanics::constitutive::{AddTo, Form, Laws, Product, add_quadratic, product};
-use crate::mechanics::constitutive::{Inadmissible, Part, compose};
+use crate::mechanics::constitutive::{Inadmissible, Laws, Part, compose};
+use crate::mechanics::linearized::{Linearized, StressRows};
 use crate::mechanics::sweep::{Mode, Number, Supports, Weights};
 use crate::mechanics::trial::Trial;
 use crate::parallel::First;
-use crate::pooled::Pooled;
 use crate::tensor::{Tensor, Vector, identity};
 
 /// Σ_p V₀ F S F_rᵀ ∇_r N_I
@@ -30,7 +27,7 @@ impl<'a, const D: usize, L: Law> Stress<'a, D, L> {
     }
 
     /// The tangent linearised at Δφ, whole or one `part`.
-    pub(super) fn linearized(&self, dphi: &[Vector<f64, D>], part: Part) -> Result<LinearizedStress, Inadmissible> {
+    pub(super) fn linearized(&self, dphi: &[Vector<f64, D>], part: Part) -> Result<StressRows, Inadmissible> {
         let form = self.laws.form();
         let count = form.rows(D);
         let mut rows = self.supports.pool().unspecified(self.supports.groups() * count, [0.0; LANES]);
@@ -42,7 +39,7 @@ impl<'a, const D: usize, L: Law> Stress<'a, D, L> {
             }
         });
         failure.check()?;
-        Ok(LinearizedStress { form, rows, factor: 1.0 })
+        Ok(StressRows::new(form, rows))
     }
 }
 
@@ -91,52 +88,8 @@ impl<const D: usize, L: Law> Term<D> for Stress<'_, D, L> {
         })
     }
 
-    fn linearize(&self, at: Trial<'_, f64, D>, part: Part) -> LinearizedTerm<'_, D> {
-        Ok(vec![Box::new(self.linearized(at.dphi, part)?)])
-    }
-}
-
-/// δσ = 𝔸 : L at all particles, one particle per lane.
-pub(super) struct LinearizedStress {
-    form: Form,
-    rows: Pooled<[f64; LANES]>,
-    /// The factor of all products.
-    factor: f64,
-}
-
-impl LinearizedStress {
-    pub(super) fn times(self, factor: f64) -> Self {
-        Self { factor: factor * self.factor, ..self }
-    }
-
-    fn of_group(&self, group: usize, dimension: usize) -> &[[f64; LANES]] {
-        let count = self.form.rows(dimension);
-        &self.rows[group * count..(group + 1) * count]
-    }
-}
-
-impl<const D: usize> Linearized<D> for LinearizedStress {
-    fn product_at_points(&self, _: Along<'_, D>) -> Option<(Mode, ProductAtPoints<'_, D>)> {
-        Some((
-            Mode::GRADIENT,
-            Box::new(|group, at, sums| {
-                let (form, rows, l) = (self.form, self.of_group(group.number, D), at.gradient.as_flattened());
-                if self.factor == 1.0 {
-                    product(D, Product { form, rows, l, out: sums.gradient.as_flattened_mut() });
-                } else {
-                    let mut unscaled = [[[0.0; LANES]; D]; D];
-                    product(D, Product { form, rows, l, out: unscaled.as_flattened_mut() });
-                    let both = sums.gradient.as_flattened_mut().iter_mut().zip(unscaled.as_flattened());
-                    both.for_each(|(sum, x)| sum.iter_mut().zip(x).for_each(|(sum, &x)| *sum += self.factor * x));
-                }
-            }),
-        ))
-    }
-
-    fn blocks_at_points(&self) -> Option<BlocksAtPoints<'_>> {
-        Some(Box::new(|group, into| {
-            let rows = self.of_group(group.number, D);
-            add_quadratic(D, AddTo { form: self.form, rows, factor: self.factor, into });
-        }))
+    fn linearize(&self, at: Trial<'_, f64, D>, part: Part, into: &mut Linearized<D>) -> Result<(), Inadmissible> {
+        into.stresses.push(self.linearized(at.dphi, part)?);
+        Ok(())
     }
 }

@@ -1,16 +1,15 @@
-//! A term of the residual, its linearisation, and the data that terms are built from.
+//! A term of the residual, and the data that terms are built from.
 
 use crate::mechanics::constitutive::{Inadmissible, Part};
-use crate::mechanics::dilatation::Scale;
+use crate::mechanics::linearized::Linearized;
 use crate::mechanics::loads::{Loads, Pose};
 use crate::mechanics::mass::Mass;
 use crate::mechanics::schemes::Alphas;
-use crate::mechanics::sweep::{At, Group, Mode, Number, Quadratic, Supports};
+use crate::mechanics::sweep::{At, Group, Mode, Number, Supports};
 use crate::mechanics::transfer::Nodal;
 use crate::mechanics::trial::Trial;
-use crate::mechanics::unknowns::Function;
 use crate::particles::{Body, Particles};
-use crate::tensor::{Tensor, Vector};
+use crate::tensor::Vector;
 
 /// The data that all terms of a step are built from.
 #[derive(Debug)]
@@ -53,28 +52,9 @@ impl<'a, const D: usize, L> Step<'a, D, L> {
     }
 }
 
-/// The direction of a product with a linearised term.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum Along<'x, const D: usize> {
-    /// A nodal field. If given, changes of the pressures of averaged cells take the place of those that the field causes.
-    Field(&'x [Vector<f64, D>], Option<&'x [f64]>),
-    /// The same gradient at all particles.
-    Gradient(&'x Tensor<f64, D>),
-}
-
 /// The contribution of a term at the particles of a group: adds q and σ to the last argument. The function is chosen once per pass.
 pub type AtPoints<'a, T, const D: usize> =
     Box<dyn Fn(Group<'_>, &At<T, D, D>, &mut At<T, D, D>) -> Result<(), Inadmissible> + Sync + 'a>;
-
-/// The contribution of a linearised term to the product, like [`AtPoints`]. A linearised term always exists, so there is no error.
-pub(crate) type ProductAtPoints<'a, const D: usize> =
-    Box<dyn Fn(Group<'_>, &At<f64, D, D>, &mut At<f64, D, D>) + Sync + 'a>;
-
-/// The effective shape functions of all unknowns at a particle, by node.
-pub(crate) type FunctionsAt<'a, const D: usize> = dyn Fn(usize) -> Vec<(usize, Function<D>)> + 'a;
-
-/// Adds the quadratic form of a linearised tangent at the particles of a group.
-pub(crate) type BlocksAtPoints<'a> = Box<dyn Fn(Group<'_>, &mut Quadratic) + Sync + 'a>;
 
 /// A sum, and the sum of the magnitudes of its contributions.
 pub type Sum<T> = (T, f64);
@@ -83,9 +63,6 @@ pub type Sum<T> = (T, f64);
 pub(super) fn summed<T: Number>(energies: impl IntoIterator<Item = T>) -> Sum<T> {
     energies.into_iter().fold((T::zero(), 0.0), |(sum, size), energy| (sum + energy, size + energy.value().abs()))
 }
-
-/// The linearisation of a term: its addends; none for a dead load.
-pub(crate) type LinearizedTerm<'a, const D: usize> = Result<Vec<Box<dyn Linearized<D> + 'a>>, Inadmissible>;
 
 /// A term of the residual R(Δφ).
 pub(crate) trait Term<const D: usize>: Sync {
@@ -128,75 +105,13 @@ pub(crate) trait Term<const D: usize>: Sync {
         Ok(())
     }
 
-    /// Linearises the term.
+    /// Linearises the term: adds its arrays to `into`. A dead load adds nothing.
     ///
     /// # Errors
     /// det F ≤ 0 somewhere.
-    fn linearize(&self, _at: Trial<'_, f64, D>, _part: Part) -> LinearizedTerm<'_, D> {
-        Ok(Vec::new())
+    fn linearize(&self, _at: Trial<'_, f64, D>, _part: Part, _into: &mut Linearized<D>) -> Result<(), Inadmissible> {
+        Ok(())
     }
-}
-
-/// A term linearised at one Δφ: the data that its product needs, and no more.
-pub(crate) trait Linearized<const D: usize>: Sync {
-    /// Adds the contribution to the product at the nodes.
-    fn add_product_at_nodes(&self, _u: &[Vector<f64, D>], _out: &mut [Vector<f64, D>]) {}
-
-    /// The contribution to a product at the particles, with its [`Mode`].
-    fn product_at_points(&self, _along: Along<'_, D>) -> Option<(Mode, ProductAtPoints<'_, D>)> {
-        None
-    }
-
-    /// Adds the contribution of the nodes to the diagonal blocks.
-    fn add_blocks_at_nodes(&self, _blocks: &mut [Tensor<f64, D>]) {}
-
-    /// Adds the contribution to the diagonal blocks that needs the effective shape functions of single particles.
-    fn add_blocks_of_functions(&self, _functions: &FunctionsAt<'_, D>, _blocks: &mut [Tensor<f64, D>]) {}
-
-    /// The contribution to the diagonal blocks at the particles.
-    fn blocks_at_points(&self) -> Option<BlocksAtPoints<'_>> {
-        None
-    }
-
-    /// The averaged cells whose dilatation is an unknown of its own.
-    fn mixed(&self) -> Option<&dyn MixedCells<D>> {
-        None
-    }
-}
-
-/// The linearised equations of averaged cells whose dilatation is an unknown of its own.
-pub(crate) trait MixedCells<const D: usize>: Sync {
-    /// B u, the changes of the cells' volumes.
-    fn volume_changes(&self, u: &[Vector<f64, D>]) -> Vec<f64>;
-
-    /// B_c M B_cᵀ of every cell, for a block-diagonal M.
-    fn softness(&self, functions: &FunctionsAt<'_, D>, inverse: &[Tensor<f64, D>]) -> Vec<f64>;
-
-    /// The cells in their order.
-    fn cells(&self) -> &[MixedCell<D>];
-}
-
-/// A cell at one trial state.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct MixedCell<const D: usize> {
-    /// The nodal field of the cell.
-    pub field: u32,
-    /// The index of the cell in the grid.
-    pub index: [u32; D],
-    /// The centroid of the particles.
-    pub centroid: Vector<f64, D>,
-    /// v
-    pub volume: f64,
-    /// ∂v/∂(∇u)
-    pub pull: Tensor<f64, D>,
-    /// k = ∂π/∂v
-    pub stiffness: f64,
-    /// γ
-    pub augmented: f64,
-    /// The units of the unknown and of its residual.
-    pub scale: Scale,
-    /// V_c
-    pub reference_volume: f64,
 }
 
 /// Where the work of a term goes.

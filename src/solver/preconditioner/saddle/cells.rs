@@ -24,17 +24,17 @@ pub struct PressureCells {
     /// Centroid, in cells from the origin of the grid.
     pub centroid: Vec<[f64; 3]>,
     /// ∂v/∂(∇u) with gradients in units of 1/h, D×D, column by column.
-    pub pull: Vec<f64>,
+    pub volume_gradient: Vec<f64>,
     /// v
     pub volume: Vec<f64>,
     /// G
     pub shear: Vec<f64>,
     /// B_c K_II⁻¹ B_cᵀ, with the diagonal blocks K_II of A + Bᵀ γ B.
-    pub softness: Vec<f64>,
+    pub compliance: Vec<f64>,
     /// k = 1/C, the change of pressure per change of volume.
     pub stiffness: Vec<f64>,
     /// γ
-    pub augmented: Vec<f64>,
+    pub augmentation: Vec<f64>,
     /// The change of v that belongs to a unit of the unknown of the cell.
     pub unit: Vec<f64>,
     /// The residual of the cell per difference of volumes.
@@ -52,7 +52,7 @@ impl PressureCells {
             .filter(|(_, filled)| **filled > FULL)
             .map(|(cell, _)| *cell)
             .collect();
-        let raw = |c: usize| cells.volume[c].powi(2) / (cells.shear[c] * cells.softness[c]);
+        let raw = |c: usize| cells.volume[c].powi(2) / (cells.shear[c] * cells.compliance[c]);
         let median = |chosen: &dyn Fn(usize) -> bool| {
             let mut all: Vec<f64> = (0..cells.volume.len())
                 .filter(|&c| chosen(c))
@@ -84,7 +84,8 @@ impl PressureCells {
         }
         let mut all: Vec<(u32, u32, Vector<f64, D>)> = Vec::new();
         for (cell, (index, centroid)) in cells.index.iter().zip(&cells.centroid).enumerate() {
-            let pull = Tensor::<f64, D>::from_column_slice(&cells.pull[cell * D * D..(cell + 1) * D * D]);
+            let volume_gradient = &cells.volume_gradient[cell * D * D..(cell + 1) * D * D];
+            let volume_gradient = Tensor::<f64, D>::from_column_slice(volume_gradient);
             let first = all.len();
             let mut add = |node: u32, b: Vector<f64, D>| match all[first..].iter_mut().find(|entry| entry.1 == node) {
                 Some(entry) => entry.2 += b,
@@ -92,7 +93,7 @@ impl PressureCells {
             };
             for (corner, _, slope) in corners::<D>(*index, *centroid) {
                 let Some(&node) = numbers.get(&corner) else { continue };
-                let b = pull * slope;
+                let b = volume_gradient * slope;
                 let Some((follows, leaders)) = followers.row(node as usize) else {
                     add(node, b);
                     continue;

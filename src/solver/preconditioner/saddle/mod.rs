@@ -57,7 +57,7 @@ impl<const D: usize> LinearOperator for Triangle<'_, D> {
         let nodal = r.len() - cells.volume.len();
         let ((r_u, r_c), (u, y)) = (r.split_at(nodal), z.split_at_mut(nodal));
         let volumes: Vec<f64> = r_c.iter().zip(&cells.weight).map(|(r, weight)| r / weight).collect();
-        let pressures: Vec<f64> = volumes.iter().zip(&cells.augmented).map(|(v, gamma)| v * gamma).collect();
+        let pressures: Vec<f64> = volumes.iter().zip(&cells.augmentation).map(|(v, gamma)| v * gamma).collect();
         let mut f = vec![0.0; nodal];
         self.system.forces(&pressures, &mut f);
         f.iter_mut().zip(r_u).for_each(|(f, r)| *f += r);
@@ -69,7 +69,7 @@ impl<const D: usize> LinearOperator for Triangle<'_, D> {
         mutant!("saddle: the pressures have the other sign": { y.iter_mut().for_each(|y| *y = -*y); });
         for (c, y) in y.iter_mut().enumerate() {
             // δp = q/(1 − γ/k) = k unit y
-            *y /= (self.schur.stiffness(c) - cells.augmented[c]) * cells.unit[c];
+            *y /= (self.schur.stiffness(c) - cells.augmentation[c]) * cells.unit[c];
         }
     }
 }

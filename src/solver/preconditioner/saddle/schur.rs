@@ -110,7 +110,7 @@ impl<const D: usize> Schur<D> {
         };
         let share = 0.5 * D as f64 / f64::from(1 << D);
         let mut stiff = schur.coupled(&schur.stiffness_of_nodes(), share);
-        let at = |c: usize| (schur.cells.volume[c], schur.cells.shear[c], schur.cells.augmented[c]);
+        let at = |c: usize| (schur.cells.volume[c], schur.cells.shear[c], schur.cells.augmentation[c]);
         let effective = schur.cells.effective_volumes();
         for (c, effective) in effective.iter().enumerate() {
             let ((v, shear, gamma), compliance) = (at(c), 1.0 / schur.stiffness(c));
@@ -126,7 +126,7 @@ impl<const D: usize> Schur<D> {
 
     /// k, at least a little more than γ.
     pub(super) fn stiffness(&self, cell: usize) -> f64 {
-        self.cells.stiffness[cell].max(1.001 * self.cells.augmented[cell])
+        self.cells.stiffness[cell].max(1.001 * self.cells.augmentation[cell])
     }
 
     /// a_I of every node.
@@ -230,13 +230,13 @@ mod tests {
             let index = [k % side, k / side, 0];
             cells.index.push(index);
             cells.centroid.push(index.map(|i| f64::from(i) + 0.5));
-            cells.pull.extend([1.0, 0.0, 0.0, 1.0]);
+            cells.volume_gradient.extend([1.0, 0.0, 0.0, 1.0]);
             for (list, value) in [
                 (&mut cells.volume, 1.0),
                 (&mut cells.shear, 1.0),
-                (&mut cells.softness, 1.0),
+                (&mut cells.compliance, 1.0),
                 (&mut cells.stiffness, 1e12),
-                (&mut cells.augmented, 1.0),
+                (&mut cells.augmentation, 1.0),
                 (&mut cells.unit, 1.0),
                 (&mut cells.weight, 1.0),
             ] {

@@ -1,0 +1,96 @@
+//! The linearised forces of points in contact.
+
+use super::FunctionsAt;
+use crate::mechanics::contact::{Carrier, FreePoint};
+use crate::mechanics::sweep::Supports;
+use crate::tensor::{Tensor, Vector};
+use std::collections::BTreeMap;
+
+/// The points in contact.
+#[derive(Debug)]
+pub(crate) struct ContactRows<const D: usize> {
+    rows: Vec<ContactRow<D>>,
+    /// For each point, the end of its nodes in `weights`.
+    ends: Vec<usize>,
+    /// The nodes that move each point, with their weights.
+    weights: Vec<(usize, f64)>,
+    /// The number of obstacles.
+    obstacles: usize,
+}
+
+/// A point in contact.
+#[derive(Debug)]
+pub(crate) struct ContactRow<const D: usize> {
+    pub carriers: Vec<Carrier<D>>,
+    /// −∂f/∂x of the force, at fixed poses of all obstacles.
+    pub tangent: Tensor<f64, D>,
+    /// The number of the free obstacle that the point touches, and how both depend on each other.
+    pub on_free: Option<(usize, FreePoint<D>)>,
+}
+
+impl<const D: usize> Default for ContactRows<D> {
+    fn default() -> Self {
+        Self { rows: Vec::new(), ends: Vec::new(), weights: Vec::new(), obstacles: 0 }
+    }
+}
+
+impl<const D: usize> ContactRows<D> {
+    pub fn new(rows: Vec<ContactRow<D>>, obstacles: usize, supports: &Supports<D>) -> Self {
+        let (mut ends, mut weights) = (Vec::with_capacity(rows.len()), Vec::new());
+        for row in &rows {
+            for carrier in &row.carriers {
+                weights.extend(carrier.weights(supports).map(|(node, n)| (node, carrier.share * n)));
+            }
+            ends.push(weights.len());
+        }
+        Self { rows, ends, weights, obstacles }
+    }
+
+    /// Each point, and the nodes that move it.
+    fn iter(&self) -> impl Iterator<Item = (&ContactRow<D>, &[(usize, f64)])> {
+        let starts = std::iter::once(0).chain(self.ends.iter().copied());
+        self.rows.iter().zip(starts.zip(&self.ends)).map(|(row, (start, &end))| (row, &self.weights[start..end]))
+    }
+
+    pub fn add_product(&self, u: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
+        let moved =
+            |weights: &[(usize, f64)]| weights.iter().fold(Vector::zeros(), |sum, &(node, n)| sum + u[node] * n);
+        // δq of the free obstacles
+        let mut motions = vec![Vector::<f64, 6>::zeros(); self.obstacles];
+        for (row, weights) in self.iter() {
+            if let Some((obstacle, free)) = &row.on_free {
+                motions[*obstacle] += free.motion * moved(weights);
+            }
+        }
+        for (ContactRow { tangent, on_free, .. }, weights) in self.iter() {
+            let mut force = tangent * moved(weights);
+            if let Some((obstacle, free)) = on_free {
+                force -= free.of_motion * motions[*obstacle];
+            }
+            weights.iter().for_each(|&(node, n)| out[node] += force * n);
+        }
+    }
+
+    /// W_I² K, with the sum W_I over all places that the node moves. A free obstacle subtracts (Σ W_I ∂f/∂q) (Σ ∂q/∂x W_I).
+    pub fn add_blocks(&self, functions: &FunctionsAt<'_, D>, blocks: &mut [Tensor<f64, D>]) {
+        let mut through: BTreeMap<(usize, usize), FreePoint<D>> = BTreeMap::new();
+        for ContactRow { carriers, tangent, on_free } in &self.rows {
+            let mut of_node: BTreeMap<usize, [f64; D]> = BTreeMap::new();
+            for Carrier { particle, share, offset } in carriers {
+                for (node, function) in functions(*particle) {
+                    let sum = of_node.entry(node).or_insert([0.0; D]);
+                    (0..D).for_each(|i| sum[i] += share * (function.value[i] + function.gradient[i].dot(offset)));
+                }
+            }
+            for (node, w) in of_node {
+                blocks[node] += Tensor::from_fn(|i, k| w[i] * tangent[(i, k)] * w[k]);
+                if let Some((obstacle, free)) = on_free {
+                    through.entry((*obstacle, node)).or_insert_with(FreePoint::zero).add(free, &w);
+                }
+            }
+        }
+        for ((_, node), FreePoint { of_motion, motion }) in through {
+            blocks[node] -= of_motion * motion;
+        }
+    }
+}

@@ -1,0 +1,51 @@
+//! The linearised tangents of the laws, as rows of numbers.
+
+use crate::lanes::LANES;
+use crate::mechanics::constitutive::{AddTo, Form, Product, add_quadratic, product};
+use crate::mechanics::sweep::{At, Group, Quadratic};
+use crate::pooled::Pooled;
+use std::sync::Arc;
+
+/// δσ = 𝔸 : L at all particles, one particle per lane.
+#[derive(Clone, Debug)]
+pub(crate) struct StressRows {
+    form: Form,
+    /// For each group of particles, the numbers of its tangents.
+    rows: Arc<Pooled<[f64; LANES]>>,
+    factor: f64,
+}
+
+impl StressRows {
+    /// Tangents that are stored in `form`.
+    pub fn new(form: Form, rows: Pooled<[f64; LANES]>) -> Self {
+        Self { form, rows: Arc::new(rows), factor: 1.0 }
+    }
+
+    pub fn times(self, factor: f64) -> Self {
+        Self { factor: factor * self.factor, ..self }
+    }
+
+    #[inline(always)]
+    fn of_group(&self, group: usize, dimension: usize) -> &[[f64; LANES]] {
+        let count = self.form.rows(dimension);
+        &self.rows[group * count..(group + 1) * count]
+    }
+
+    #[inline(always)]
+    pub fn add_product<const D: usize>(&self, group: Group<'_>, at: &At<f64, D, D>, sums: &mut At<f64, D, D>) {
+        let (form, rows, l) = (self.form, self.of_group(group.number, D), at.gradient.as_flattened());
+        if self.factor == 1.0 {
+            return product(D, Product { form, rows, l, out: sums.gradient.as_flattened_mut() });
+        }
+        let mut unscaled = [[[0.0; LANES]; D]; D];
+        product(D, Product { form, rows, l, out: unscaled.as_flattened_mut() });
+        for (sum, x) in sums.gradient.as_flattened_mut().iter_mut().zip(unscaled.as_flattened()) {
+            (0..LANES).for_each(|lane| sum[lane] += self.factor * x[lane]);
+        }
+    }
+
+    pub fn add_quadratic(&self, dimension: usize, group: Group<'_>, into: &mut Quadratic) {
+        let rows = self.of_group(group.number, dimension);
+        add_quadratic(dimension, AddTo { form: self.form, rows, factor: self.factor, into });
+    }
+}
