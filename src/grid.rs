@@ -1,10 +1,24 @@
 //! The Cartesian background grid: node positions and numbering. It stores nothing per node.
+//!
+//! Nodes are numbered tile by tile. A tile is a cube of 64 nodes: 64, 8 × 8 or 4 × 4 × 4. So nodes that lie near each other have near numbers.
 
 use crate::tensor::Vector;
 
 /// A position this near to a node lies on the node. The distance is a round-off bound, relative to the coordinates of the position and of
 /// the grid's origin.
 const ON_NODE: f64 = 32.0 * f64::EPSILON;
+
+/// Number of nodes in a tile.
+pub(crate) const TILE: u64 = 64;
+
+/// Edge of a tile in nodes.
+pub(crate) const fn tile_edge(dimension: usize) -> u64 {
+    match dimension {
+        1 => 64,
+        2 => 8,
+        _ => 4,
+    }
+}
 
 /// The uniform background grid of a box: `cells[k]` cells of edge `spacing` along axis `k`, nodes at the cell corners.
 ///
@@ -14,8 +28,8 @@ const ON_NODE: f64 = 32.0 * f64::EPSILON;
 ///
 /// let grid = Grid { origin: Vector::from([0.0, -1.0]), spacing: 0.5, cells: [4, 2] };
 /// assert_eq!(grid.node_count(), 5 * 3);
-/// // The first axis runs fastest; number and index are inverse to each other.
-/// assert_eq!((grid.id([1, 0]), grid.id([0, 1]), grid.index(grid.id([3, 2]))), (1, 5, [3, 2]));
+/// // The first axis runs fastest in a tile of 8 × 8 nodes; number and index are inverse to each other.
+/// assert_eq!((grid.id([1, 0]), grid.id([0, 1]), grid.index(grid.id([3, 2]))), (1, 8, [3, 2]));
 /// assert_eq!(grid.position([4, 2]), Vector::from([2.0, 0.0]));
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -99,10 +113,29 @@ impl<const D: usize> Grid<D> {
         self.cells.iter().map(|&n| u64::from(n) + 1).product()
     }
 
-    /// Number of a node from its index along each axis; the first axis runs fastest.
+    /// Number of a node from its index along each axis. Tiles follow each other, and nodes within a tile; the first axis runs fastest.
     #[inline]
     pub fn id(&self, index: [u32; D]) -> u64 {
-        (0..D).rev().fold(0, |id, k| id * (u64::from(self.cells[k]) + 1) + u64::from(index[k]))
+        let (edge, tiles) = (tile_edge(D), self.tiles());
+        let (mut tile, mut local) = (0, 0);
+        for k in (0..D).rev() {
+            let at = u64::from(index[k]);
+            tile = tile * tiles[k] + at / edge;
+            local = local * edge + at % edge;
+        }
+        tile * TILE + local
+    }
+
+    /// Tiles along each axis.
+    #[inline]
+    fn tiles(&self) -> [u64; D] {
+        self.cells.map(|cells| (u64::from(cells) + 1).div_ceil(tile_edge(D)))
+    }
+
+    /// The numbers of a nodal field: those of all tiles.
+    #[inline]
+    pub(crate) fn numbers_of_field(&self) -> u64 {
+        self.tiles().iter().product::<u64>() * TILE
     }
 
     /// Number of a node in one of several nodal fields on this grid. [`Self::index`] is the same in all fields.
@@ -119,18 +152,20 @@ impl<const D: usize> Grid<D> {
     #[inline]
     pub fn id_in(&self, field: u32, index: [u32; D]) -> u64 {
         // Most scenes have one field.
-        if field == 0 { self.id(index) } else { u64::from(field) * self.node_count() + self.id(index) }
+        if field == 0 { self.id(index) } else { u64::from(field) * self.numbers_of_field() + self.id(index) }
     }
 
     /// The nodal field of the node numbered `id`.
     pub fn field(&self, id: u64) -> u32 {
-        (id / self.node_count()) as u32
+        (id / self.numbers_of_field()) as u32
     }
 
     /// Index along each axis of the node numbered `id`.
     #[inline]
     pub fn index(&self, id: u64) -> [u32; D] {
-        digits(id, self.cells.map(|n| u64::from(n) + 1)).map(|index| index as u32)
+        let edge = tile_edge(D);
+        let (tile, local) = (digits(id / TILE, self.tiles()), digits(id % TILE, [edge; D]));
+        std::array::from_fn(|k| (tile[k] * edge + local[k]) as u32)
     }
 
     /// Position of the node with the given index.
@@ -210,8 +245,12 @@ mod tests {
     #[test]
     fn ids_and_indices_are_inverse_to_each_other() {
         let grid = Grid { origin: Vector::zeros(), spacing: 1.0, cells: [4, 2, 3] };
-        for id in 0..grid.node_count() {
-            assert_eq!(grid.id(grid.index(id)), id);
+        let nodes = || indices(grid.cells.map(|cells| u64::from(cells) + 1)).map(|index| index.map(|i| i as u32));
+        assert_eq!(nodes().count() as u64, grid.node_count());
+        for (index, field) in nodes().flat_map(|index| [0, 1, 2].map(|field| (index, field))) {
+            let id = grid.id_in(field, index);
+            assert_eq!((grid.index(id), grid.field(id)), (index, field));
+            assert!(id < 3 * grid.numbers_of_field());
         }
     }
 }

@@ -1,6 +1,7 @@
-//! Active nodes have N ≠ 0 or ∇N ≠ 0 at some particle. They are numbered in the order of the grid.
+//! Active nodes have N ≠ 0 or ∇N ≠ 0 at some particle. They are numbered in the order of the [grid](Grid::id), tile by tile, so that nodes that lie
+//! near each other have near numbers.
 
-use crate::grid::Grid;
+use crate::grid::{Grid, TILE};
 use crate::tensor::Vector;
 use std::sync::Arc;
 
@@ -13,60 +14,137 @@ use std::sync::Arc;
 ///
 /// // Two particles in neighbouring cells of a grid of 100 × 100 cells share two of their nodes.
 /// let grid = Grid { origin: Vector::zeros(), spacing: 1.0, cells: [100, 100] };
-/// let cell = |i| [grid.id([i, 7]), grid.id([i + 1, 7]), grid.id([i, 8]), grid.id([i + 1, 8])];
+/// let cell = |i| [grid.id([i, 2]), grid.id([i + 1, 2]), grid.id([i, 3]), grid.id([i + 1, 3])];
 /// let nodes = Nodes::new([cell(3), cell(4)].concat());
 /// assert_eq!((nodes.len(), nodes.is_empty()), (6, false));
 /// // Unknowns are numbered by active nodes, in the order of the grid.
-/// assert_eq!(nodes.number(grid.id([5, 7])), Some(2));
-/// assert_eq!((nodes.ids()[2], nodes.number(grid.id([6, 7]))), (grid.id([5, 7]), None));
-/// assert_eq!(nodes.positions(&grid).nth(2), Some(([5, 7], Vector::from([5.0, 7.0]))));
+/// assert_eq!(nodes.number(grid.id([5, 2])), Some(2));
+/// assert_eq!((nodes.id(2), nodes.number(grid.id([6, 2]))), (grid.id([5, 2]), None));
+/// assert_eq!(nodes.positions(&grid).nth(2), Some(([5, 2], Vector::from([5.0, 2.0]))));
 /// ```
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Nodes {
-    /// Grid numbers of the active nodes, ascending.
-    ids: Arc<Vec<u64>>,
+    /// The tiles with an active node, ascending.
+    tiles: Arc<Vec<Tile>>,
+    len: usize,
+}
+
+/// The active nodes of a tile.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Tile {
+    /// The grid number of the first node of the tile, over 64.
+    number: u64,
+    /// Bit k stands for the node k of the tile.
+    active: u64,
+    /// The active number of the first of them.
+    first: u32,
+}
+
+impl Tile {
+    /// The number of active nodes before the node k.
+    fn before(self, k: u64) -> u32 {
+        (self.active & ((1 << k) - 1)).count_ones()
+    }
 }
 
 impl Nodes {
     /// From grid numbers in any order, with repetitions.
     pub fn new(mut ids: Vec<u64>) -> Self {
         ids.sort_unstable();
-        ids.dedup();
-        Self::ascending(ids)
+        Self::of_tiles(ids.into_iter().map(|id| (id / TILE, 1 << (id % TILE))).collect())
     }
 
-    /// From grid numbers that ascend already.
-    pub(crate) fn ascending(ids: Vec<u64>) -> Self {
-        Self { ids: Arc::new(ids) }
-    }
-
-    /// The memory of the list for reuse; empty if a clone still uses it.
-    pub(crate) fn into_spare(self) -> Vec<u64> {
-        Arc::try_unwrap(self.ids).unwrap_or_default()
+    /// From the numbers of tiles, in any order, each with bits for its active nodes. A tile may occur several times, with other nodes.
+    pub(crate) fn of_tiles(mut parts: Vec<(u64, u64)>) -> Self {
+        parts.sort_unstable_by_key(|&(number, _)| number);
+        let mut len = 0;
+        let tile = |same: &[(u64, u64)]| {
+            let active = same.iter().fold(0, |all, (_, active)| all | active);
+            let tile = Tile { number: same[0].0, active, first: len };
+            len += active.count_ones();
+            tile
+        };
+        let tiles: Vec<Tile> = parts.chunk_by(|one, next| one.0 == next.0).map(tile).collect();
+        Self { tiles: Arc::new(tiles), len: len as usize }
     }
 
     /// Number of active nodes.
     pub fn len(&self) -> usize {
-        self.ids.len()
+        self.len
     }
 
     /// Whether no node is active.
     pub fn is_empty(&self) -> bool {
-        self.ids.is_empty()
+        self.len == 0
     }
 
     /// Grid numbers of the active nodes, ascending.
-    pub fn ids(&self) -> &[u64] {
-        &self.ids
+    pub fn ids(&self) -> impl Iterator<Item = u64> {
+        self.tiles.iter().flat_map(|tile| bits(tile.active).map(|k| tile.number * TILE + k))
+    }
+
+    /// Grid number of the active node with this number.
+    ///
+    /// # Panics
+    /// There are not so many active nodes.
+    pub fn id(&self, node: usize) -> u64 {
+        let tile = &self.tiles[self.tiles.partition_point(|tile| tile.first as usize <= node) - 1];
+        let mut active = tile.active;
+        (tile.first as usize..node).for_each(|_| active &= active - 1);
+        tile.number * TILE + u64::from(active.trailing_zeros())
     }
 
     /// Active number of the node with the grid number `id`.
     pub fn number(&self, id: u64) -> Option<usize> {
-        self.ids.binary_search(&id).ok()
+        let at = self.tiles.binary_search_by_key(&(id / TILE), |tile| tile.number).ok()?;
+        let (tile, k) = (self.tiles[at], id % TILE);
+        (tile.active >> k & 1 == 1).then(|| (tile.first + tile.before(k)) as usize)
+    }
+
+    /// The active numbers of the nodes 0 to 63 of a tile that has active nodes.
+    pub(crate) fn numbers_in(&self, tile: u64) -> impl Fn(u64) -> u32 {
+        let at = self.tiles.partition_point(|one| one.number < tile);
+        let tile = self.tiles[at];
+        move |k| tile.first + tile.before(k)
+    }
+
+    /// The number of active nodes with grid numbers below that of the first node of a tile, which is a multiple of 64.
+    pub(crate) fn before(&self, id: u64) -> usize {
+        let at = self.tiles.partition_point(|tile| tile.number < id / TILE);
+        self.tiles.get(at).map_or(self.len, |tile| tile.first as usize)
     }
 
     /// Index along each axis and position of every active node.
     pub fn positions<const D: usize>(&self, grid: &Grid<D>) -> impl Iterator<Item = ([u32; D], Vector<f64, D>)> {
-        self.ids.iter().map(|&id| grid.index(id)).map(|index| (index, grid.position(index)))
+        self.ids().map(|id| grid.index(id)).map(|index| (index, grid.position(index)))
+    }
+}
+
+/// The bits that are set, ascending.
+pub(crate) fn bits(mut set: u64) -> impl Iterator<Item = u64> {
+    std::iter::from_fn(move || {
+        let next = (set != 0).then(|| u64::from(set.trailing_zeros()));
+        set &= set.wrapping_sub(1);
+        next
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_and_ids_are_inverse_to_each_other() {
+        let ids: Vec<u64> = (0..3000).filter(|id| id * id % 7 < 3 && !(400..900).contains(id)).collect();
+        let nodes = Nodes::new(ids.iter().rev().chain(&ids).copied().collect());
+        assert!(nodes.ids().eq(ids.iter().copied()));
+        for id in 0..3000 {
+            let place = ids.binary_search(&id).ok();
+            assert_eq!(nodes.number(id), place);
+            place.into_iter().for_each(|place| assert_eq!(nodes.id(place), id));
+        }
+        for id in (0..3200).step_by(64) {
+            assert_eq!(nodes.before(id), ids.partition_point(|&one| one < id));
+        }
     }
 }

@@ -69,8 +69,8 @@ fn of_field<const D: usize>(
         (padded(*cell), volume / whole)
     };
     let range = supports.nodes_of(field);
-    let nodes: Vec<[u32; 3]> =
-        supports.active().ids()[range.clone()].iter().map(|&id| padded(grid.index(id))).collect();
+    let of_field = supports.active().ids().skip(range.start).take(range.len());
+    let nodes: Vec<[u32; 3]> = of_field.map(|id| padded(grid.index(id))).collect();
     let cells = volumes.iter().map(share).collect();
     let occupied = Occupied { dimension: D, grid: padded(grid.cells), nodes: &nodes, cells };
     (range.start, Extension::new(pieces, &occupied))

@@ -1,8 +1,7 @@
 //! Contact with obstacles and between bodies at the end of a step: forces, work, friction loss, and the new states of friction and of free
 //! obstacles.
 
-use super::work::halfway;
-use super::{Simulation, StepError};
+use super::{ContactForces, Simulation, StepError};
 use crate::approximation::ShapeFunction;
 use crate::material::Law;
 use crate::mechanics::contact::{
@@ -15,24 +14,6 @@ use crate::mechanics::terms::{ContactForce, Step, penalties};
 use crate::tensor::Vector;
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
-
-/// The contact of all bodies with one obstacle, or of a pair of bodies, at the end of a step.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ContactForces<const D: usize> {
-    /// The force on the obstacle, or on the second body of the pair, at t_{n+1}.
-    pub force: Vector<f64, D>,
-    /// The moment of the force. In 2D the moment is the last component. For an obstacle, it is about the middle of its bounding box, which
-    /// moves with the obstacle; an unbounded obstacle has its moment about the origin of its frame. For a pair, it is about the origin.
-    pub moment: [f64; 3],
-    /// The reference area of contact.
-    pub area: f64,
-    /// The largest depth of a point in the obstacle or in the other body (length).
-    pub depth: f64,
-    /// The work of the moving obstacle on the bodies since the start; 0 for a pair.
-    pub work: f64,
-    /// The energy dissipated by friction since the start.
-    pub friction_loss: f64,
-}
 
 /// The changes at all contacts in a step.
 #[derive(Debug, Default)]
@@ -55,18 +36,6 @@ pub(super) struct ContactUpdate<const D: usize> {
     pub work: f64,
     /// The friction loss of all contacts in the step.
     pub friction_loss: f64,
-}
-
-impl<const D: usize> ContactForces<D> {
-    /// No contact yet.
-    pub(crate) const NONE: Self = Self {
-        force: Vector::from_array_storage(nalgebra::ArrayStorage([[0.0; D]])),
-        moment: [0.0; 3],
-        area: 0.0,
-        depth: 0.0,
-        work: 0.0,
-        friction_loss: 0.0,
-    };
 }
 
 impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
@@ -373,4 +342,9 @@ fn moment<const D: usize>(arm: &Vector<f64, D>, force: &Vector<f64, D>) -> [f64;
 
 fn add(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|i| a[i] + b[i])
+}
+
+/// The motion in the middle of a step.
+pub(super) fn halfway<const D: usize>(before: &[Vector<f64, D>], after: &[Vector<f64, D>]) -> Vec<Vector<f64, D>> {
+    before.iter().zip(after).map(|(before, after)| (before + after) * 0.5).collect()
 }

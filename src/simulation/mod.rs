@@ -18,10 +18,9 @@ mod work;
 
 pub use crate::mechanics::loads::Reaction;
 pub(crate) use compiled::as_type;
-pub use contacts::ContactForces;
 pub use history::History;
 pub use next_step::NextStep;
-pub use report::{AdvanceError, BareParticle, FailedAttempt, StepError, StepReport};
+pub use report::{AdvanceError, BareParticle, ContactForces, FailedAttempt, StepError, StepReport};
 pub use settings::{InitialGuess, Settings};
 pub use touching::Sharing;
 

@@ -1,6 +1,6 @@
 //! Reports and errors of a step.
 
-use super::{ContactForces, Sharing};
+use super::Sharing;
 use crate::causes;
 use crate::mechanics::check::CheckError;
 use crate::mechanics::loads::Reaction;
@@ -9,6 +9,7 @@ use crate::mechanics::rigid::Loose;
 use crate::mechanics::sweep::SupportError;
 use crate::phases::Stopwatch;
 use crate::solver::{LinearError, NewtonError, NewtonFailure, NewtonHistory, NewtonReport};
+use crate::tensor::Vector;
 
 /// The report of a step.
 #[derive(Clone, Debug)]
@@ -50,6 +51,36 @@ impl<const D: usize> StepReport<D> {
     pub fn touches(&self) -> bool {
         self.obstacles.iter().chain(&self.pairs).any(|contact| contact.area > 0.0)
     }
+}
+
+/// The contact of all bodies with one obstacle, or of a pair of bodies, at the end of a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactForces<const D: usize> {
+    /// The force on the obstacle, or on the second body of the pair, at t_{n+1}.
+    pub force: Vector<f64, D>,
+    /// The moment of the force. In 2D the moment is the last component. For an obstacle, it is about the middle of its bounding box, which
+    /// moves with the obstacle; an unbounded obstacle has its moment about the origin of its frame. For a pair, it is about the origin.
+    pub moment: [f64; 3],
+    /// The reference area of contact.
+    pub area: f64,
+    /// The largest depth of a point in the obstacle or in the other body (length).
+    pub depth: f64,
+    /// The work of the moving obstacle on the bodies since the start; 0 for a pair.
+    pub work: f64,
+    /// The energy dissipated by friction since the start.
+    pub friction_loss: f64,
+}
+
+impl<const D: usize> ContactForces<D> {
+    /// No contact yet.
+    pub(crate) const NONE: Self = Self {
+        force: Vector::from_array_storage(nalgebra::ArrayStorage([[0.0; D]])),
+        moment: [0.0; 3],
+        area: 0.0,
+        depth: 0.0,
+        work: 0.0,
+        friction_loss: 0.0,
+    };
 }
 
 /// A failed attempt at a step.

@@ -1,6 +1,6 @@
 //! Reactions of a step, and the work of all external forces.
 
-use super::contacts::ContactUpdate;
+use super::contacts::{ContactUpdate, halfway};
 use super::{Reaction, Simulation, StepError};
 use crate::approximation::ShapeFunction;
 use crate::material::Law;
@@ -101,7 +101,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
                 let of_field = &mut reactions[dof.owner * fields + supports.field_of_node(dof.node) as usize];
                 of_field.force[dof.component] += reaction + blow;
                 if let Some(rotation) = conditions[dof.owner].rotation() {
-                    let x = self.grid.position(self.grid.index(supports.active().ids()[dof.node])) + phi[dof.node];
+                    let x = self.grid.position(self.grid.index(supports.active().id(dof.node))) + phi[dof.node];
                     of_field.torque += rotation.moment(&x, dof.component, reaction + blow);
                 }
                 work += (if is_mean { blow } else { 0.5 * reaction + blow }) * dof.step.increment;
@@ -109,11 +109,6 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         }
         Ok((reactions, work))
     }
-}
-
-/// The motion in the middle of a step.
-pub(super) fn halfway<const D: usize>(before: &[Vector<f64, D>], after: &[Vector<f64, D>]) -> Vec<Vector<f64, D>> {
-    before.iter().zip(after).map(|(before, after)| (before + after) * 0.5).collect()
 }
 
 /// The work of a force along Δφ.

@@ -1,11 +1,10 @@
 //! Rigid obstacles that bodies touch: their shape, their motion, and the state of their friction.
 
-use super::RigidBody;
 use super::prescribed::Motion;
+use super::{Pose, RigidBody};
 use crate::grid::Grid;
-use crate::scalar::Real;
 use crate::shape::Shape;
-use crate::tensor::{Tensor, Vector, identity};
+use crate::tensor::{Vector, identity};
 
 /// A rigid obstacle. Bodies touch it without adhesion, with Coulomb friction.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,15 +30,6 @@ pub struct Obstacle<const D: usize> {
     pub work: f64,
     /// The energy dissipated by friction since the start.
     pub friction_loss: f64,
-}
-
-/// The rigid motion x = b + R X of an obstacle since t = 0. X is a position in the frame of the obstacle.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pose<const D: usize, T = f64> {
-    /// R
-    pub rotation: Tensor<T, D>,
-    /// b
-    pub shift: Vector<T, D>,
 }
 
 impl<const D: usize> Obstacle<D> {
@@ -102,24 +92,5 @@ impl<const D: usize> Obstacle<D> {
     /// Whether the obstacle moves at any time.
     pub fn moves(&self) -> bool {
         self.free.is_some() || self.motion.iter().flatten().any(|motion| *motion != Motion::Rest)
-    }
-}
-
-impl<const D: usize> Pose<D> {
-    /// The pose as constants of another number type.
-    pub(crate) fn lit<T: Real>(&self) -> Pose<D, T> {
-        Pose { rotation: self.rotation.map(T::lit), shift: self.shift.map(T::lit) }
-    }
-}
-
-impl<T: Real, const D: usize> Pose<D, T> {
-    /// X = Rᵀ (x − b), a position in the frame of the obstacle.
-    pub fn to_frame(&self, x: &Vector<T, D>) -> Vector<T, D> {
-        self.rotation.tr_mul(&(x - self.shift))
-    }
-
-    /// x = b + R X
-    pub fn to_space(&self, x: &Vector<T, D>) -> Vector<T, D> {
-        self.shift + self.rotation * x
     }
 }

@@ -80,7 +80,7 @@ impl<const D: usize> LastEquilibrium<D> {
             let dofs: Vec<_> = prescribed.iter().filter(|dof| holder(dof) == number).collect();
             // The moment is m = Σ arm · r.
             let arm = |dof: &PrescribedDof| {
-                let x = supports.grid().position(supports.grid().index(supports.active().ids()[dof.node]));
+                let x = supports.grid().position(supports.grid().index(supports.active().id(dof.node)));
                 condition.rotation().map_or(0.0, |rotation| rotation.moment(&x, dof.component, 1.0))
             };
             // A new condition has no reaction.

@@ -107,6 +107,14 @@ impl Block {
         (0..wx * wy * wz).map(entry).filter(|(_, n, grad_n)| *n != 0.0 || grad_n.iter().any(|&g| g != 0.0))
     }
 
+    /// The index in the grid of a place in the box.
+    #[inline]
+    pub(super) fn index<const D: usize>(&self, place: usize) -> [u32; D] {
+        let [nx, ny, _] = self.size;
+        let at = [place % nx, place / nx % ny, place / (nx * ny)];
+        std::array::from_fn(|k| self.origin[k] + at[k] as u32)
+    }
+
     /// Number of nodes in the box.
     pub(super) fn box_nodes(&self) -> usize {
         self.size.iter().product()

@@ -1,4 +1,4 @@
-//! The set-up of [`Tiled`](super::tiled::Tiled): the shape functions and groups of each block, and the numbers of the active nodes.
+//! The set-up of [`Tiled`](super::tiled::Tiled): the shape functions and groups of each block.
 
 use super::block::{Block, Span};
 use super::columns::{Along, Columns, Family};
@@ -8,7 +8,6 @@ use super::points::Points;
 use crate::approximation::ApproximationError;
 use crate::grid::Grid;
 use crate::lanes::LANES;
-use crate::nodes::Nodes;
 
 /// Working memory of one thread.
 #[derive(Default)]
@@ -56,8 +55,6 @@ impl<const D: usize> Builder<'_, D> {
             block.origin[k] = low;
         }
         self.group(keys, block, &scratch.along);
-        block.nodes.clear();
-        block.places.clear();
         block.active.clear();
         block.active.resize(block.size[1] * block.size[2], 0);
         let mut start = 0;
@@ -163,95 +160,4 @@ fn group_end<const D: usize>(keys: &[Key], along_x: &[[u32; 2]], start: usize) -
         end = next;
     }
     end
-}
-
-/// A row of a box along x.
-#[derive(Debug)]
-pub(super) struct Row {
-    /// Grid number of the node with index 0 along x in its line.
-    start: u64,
-    /// Index along x of its first node.
-    x: usize,
-    block: usize,
-    /// The place of its first node in the box.
-    place: usize,
-    /// Its active nodes, as a bit set.
-    active: u64,
-}
-
-impl Row {
-    /// The active nodes, counted from the first node of the row.
-    fn nodes(&self) -> impl Iterator<Item = usize> + use<> {
-        let mut left = self.active;
-        std::iter::from_fn(move || {
-            let next = (left != 0).then(|| left.trailing_zeros() as usize);
-            left &= left.wrapping_sub(1);
-            next
-        })
-    }
-
-    /// Index along x of the node behind the last active one.
-    fn end(&self) -> usize {
-        self.x + (u64::BITS - self.active.leading_zeros()) as usize
-    }
-}
-
-/// Numbers the active nodes in the order of the grid, and tells each block the numbers in its box. The arrays `rows` and `ids` are reused.
-pub(super) fn number<const D: usize>(
-    grid: &Grid<D>,
-    blocks: &mut [Block],
-    rows: &mut Vec<Row>,
-    mut ids: Vec<u64>,
-) -> Nodes {
-    rows.clear();
-    rows.reserve(blocks.iter().map(|block| block.active.len()).sum());
-    for (b, block) in blocks.iter().enumerate() {
-        let [nx, ny, nz] = block.size;
-        for z in 0..nz {
-            for y in 0..ny {
-                let mut index: [u32; D] = std::array::from_fn(|k| block.origin[k] + [0, y, z][k] as u32);
-                let x = index[0] as usize;
-                index[0] = 0;
-                let place = (z * ny + y) * nx;
-                rows.push(Row {
-                    start: grid.id_in(block.field, index),
-                    x,
-                    block: b,
-                    place,
-                    active: block.active[z * ny + y],
-                });
-            }
-        }
-    }
-    rows.sort_unstable_by_key(|row| (row.start, row.x, row.block));
-    ids.clear();
-    let mut numbers: Vec<u32> = Vec::new();
-    // Overlapping or adjacent rows of one line are numbered together. A gap between two bodies splits a line, so empty space costs nothing.
-    let mut reach = 0;
-    let together = |row: &Row, next: &Row| {
-        reach = row.end().max(reach);
-        let together = next.start == row.start && next.x <= reach;
-        reach = if together { reach } else { 0 };
-        together
-    };
-    for same in rows.chunk_by(together) {
-        let low = same[0].x;
-        numbers.clear();
-        for row in same {
-            numbers.resize(numbers.len().max(row.end() - low), u32::MAX);
-            row.nodes().for_each(|node| numbers[row.x - low + node] = 0);
-        }
-        for (x, number) in numbers.iter_mut().enumerate().filter(|(_, number)| **number == 0) {
-            *number = ids.len() as u32;
-            ids.push(same[0].start + (low + x) as u64);
-        }
-        for row in same {
-            let block = &mut blocks[row.block];
-            for node in row.nodes() {
-                block.nodes.push(numbers[row.x - low + node]);
-                block.places.push((row.place + node) as u32);
-            }
-        }
-    }
-    Nodes::ascending(ids)
 }

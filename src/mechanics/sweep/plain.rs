@@ -81,7 +81,7 @@ impl<const D: usize> Plain<D> {
             + size_of_val(self.particles.as_slice())
     }
 
-    pub(super) fn of(&self, particle: usize) -> Vec<Entry<usize, D>> {
+    pub(super) fn of(&self, _: &Grid<D>, particle: usize) -> Vec<Entry<usize, D>> {
         self.entries(particle).collect()
     }
 

@@ -7,14 +7,11 @@
 use super::block::{Block, Group};
 use super::blocks::{Quadratic, ScatterBlocks, scatter_blocks};
 use super::kernel::{self, At, Gather, Scatter, Window};
-use super::tiled::Tiled;
+use super::tiled::{RANGE, Tiled};
 use super::{Evaluate, Fill, Mode, Point};
 use crate::lanes::LANES;
 use crate::parallel;
 use crate::tensor::Tensor;
-
-/// Number of nodes in a range.
-pub(super) const RANGE: usize = 256;
 
 /// Below this number of groups, waking the threads costs more than the work.
 const PARALLEL: usize = 256;

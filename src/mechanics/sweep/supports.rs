@@ -329,7 +329,7 @@ impl<const D: usize> Supports<D> {
 
     /// The entries (active node, N, ∇_r N) of one particle.
     pub fn of(&self, particle: usize) -> impl Iterator<Item = (usize, f64, Vector<f64, D>)> {
-        either!(self, way => way.of(particle)).into_iter()
+        either!(self, way => way.of(&self.grid, particle)).into_iter()
     }
 
     /// Σ N_I u_I at one particle.

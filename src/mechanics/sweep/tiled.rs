@@ -4,11 +4,11 @@
 //! Particles are taken in the order (cell, id). [Groups and blocks](super) are defined on the page of the module.
 
 use super::block::{Block, Group};
-use super::builder::{Builder, Row, number};
+use super::builder::Builder;
 use super::columns::Family;
+use super::numbering::number;
 use super::order::{self, Key};
 use super::points::{Points, SupportError};
-use super::regions::RANGE;
 use crate::approximation::{ApproximationError, Scratch, Separable, ShapeFunction, Support};
 use crate::grid::Grid;
 use crate::lanes::LANES;
@@ -17,6 +17,9 @@ use crate::parallel;
 use crate::parallel::First;
 use crate::pooled::Pool;
 use crate::tensor::Vector;
+
+/// Number of nodes in a range, over which one task adds the boxes of the blocks.
+pub(super) const RANGE: usize = 256;
 
 /// The shape functions of all particles, by axis.
 #[derive(Debug, Default)]
@@ -32,8 +35,6 @@ pub(super) struct Tiled<const D: usize> {
     keys: Vec<Key>,
     /// Whether the particles lie in memory in this order.
     pub(super) is_memory_order: bool,
-    /// Rows and nodes of the last numbering, whose memory the next step reuses.
-    rows: Vec<Row>,
     nodes: Nodes,
 }
 
@@ -56,7 +57,7 @@ impl<const D: usize> Tiled<D> {
             let (particle, source) = failing.min_by_key(|&(id, _)| id).unwrap_or((points.id(particle), source));
             SupportError { particle, source }
         };
-        let Self { mut blocks, mut ranges, slots, keys, mut rows, nodes, .. } = spare.unwrap_or_default();
+        let Self { mut blocks, mut ranges, slots, keys, .. } = spare.unwrap_or_default();
         let keys = order::sorted(grid, points, keys).map_err(|particle| {
             let outside = ApproximationError::Outside { position: Vec::new(), lower: Vec::new(), upper: Vec::new() };
             failure(particle, outside)
@@ -75,11 +76,11 @@ impl<const D: usize> Tiled<D> {
             block.first = first;
             first += block.len();
         }
-        let nodes = number(grid, &mut blocks, &mut rows, nodes.into_spare());
+        let nodes = number(grid, &mut blocks);
         list_blocks(&blocks, nodes.len(), &mut ranges);
         let is_memory_order = keys.iter().zip(0..).all(|(key, place)| key.particle == place);
         let (pool, numbered) = (pool.clone(), nodes.clone());
-        let mut tiled = Self { blocks, ranges, pool, slots, keys, is_memory_order, rows, nodes: numbered };
+        let mut tiled = Self { blocks, ranges, pool, slots, keys, is_memory_order, nodes: numbered };
         tiled.find_slots();
         Ok((tiled, nodes))
     }
@@ -148,13 +149,12 @@ impl<const D: usize> Tiled<D> {
         size_of_val(self.slots.as_slice()) + ranges + self.blocks.iter().map(Block::bytes).sum::<usize>()
     }
 
-    pub(super) fn of(&self, particle: usize) -> Vec<(usize, f64, Vector<f64, D>)> {
+    pub(super) fn of(&self, grid: &Grid<D>, particle: usize) -> Vec<(usize, f64, Vector<f64, D>)> {
         let slot = self.slots[particle] as usize;
         let (group, lane) = (slot / LANES, slot % LANES);
         let block = &self.blocks[self.blocks.partition_point(|block| block.first <= group) - 1];
         let active = |(place, n, grad_n): (usize, f64, _)| {
-            let at = block.places.binary_search(&(place as u32)).ok()?;
-            Some((block.nodes[at] as usize, n, grad_n))
+            Some((self.nodes.number(grid.id_in(block.field, block.index(place)))?, n, grad_n))
         };
         block.entries::<D>(group - block.first, lane).filter_map(active).collect()
     }
