@@ -21,7 +21,7 @@ use std::io::{self, Write};
 const MAGIC: &[u8; 8] = b"bfree\r\n\x1a";
 
 /// Version of the format.
-const VERSION: u32 = 8;
+const VERSION: u32 = 9;
 
 /// Numbers converted to bytes at a time.
 const CHUNK: usize = 8192;

@@ -1,8 +1,9 @@
 //! The tangent check of a run. Each piece of the tangent, through the products that the solver applies, is compared with the derivative of
 //! the residual by dual numbers.
 
-use crate::material::{Law, MaterialState};
-use crate::mechanics::constitutive::{Part, compose};
+use crate::material::Law;
+use crate::mechanics::constitutive::Part;
+use crate::mechanics::kinematics::Kinematics;
 use crate::mechanics::mixed::MixedTangent;
 use crate::mechanics::residual::{Equilibrium, Inadmissible};
 use crate::mechanics::tangent::Tangent;
@@ -98,7 +99,7 @@ pub fn direction<const D: usize>(nodes: usize, seed: u64) -> Vec<Vector<f64, D>>
 }
 
 impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
-    /// Compares the tangent at Δφ in the direction `u`, each piece and the whole, with dual numbers through the same transfer loop. The
+    /// Compares the tangent at φ in the direction `u`, each piece and the whole, with dual numbers through the same transfer loop. The
     /// tangent acts through the products that the solver applies. Then the diagonal blocks of the preconditioner are compared with the
     /// product. Laws from shared libraries compare their claims with differences, at a few particles.
     ///
@@ -112,40 +113,40 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     /// let nodal = Nodal::project(particles, &supports, 1.0)?;
     /// let equilibrium = simulation.equilibrium(&supports, &nodal, &[], simulation.settings.scheme.end(dt), dt);
     /// let u = direction::<2>(nodes.len(), 2);
-    /// let dphi: Vec<_> = direction::<2>(nodes.len(), 1).iter().map(|x| x * 0.01).collect();
-    /// equilibrium.check_tangent(&dphi, &u)?;
+    /// let phi: Vec<_> = direction::<2>(nodes.len(), 1).iter().map(|x| x * 0.01).collect();
+    /// equilibrium.check_tangent(&phi, &u)?;
     /// // Where a particle is turned inside out there is nothing to compare.
-    /// let far: Vec<_> = dphi.iter().map(|x| x * 1000.0).collect();
+    /// let far: Vec<_> = phi.iter().map(|x| x * 1000.0).collect();
     /// assert!(matches!(equilibrium.check_tangent(&far, &u), Err(CheckError::Inadmissible(_))));
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     ///
     /// # Errors
     /// The first mismatch, or a particle with det F ≤ 0.
-    pub fn check_tangent(&self, dphi: &[Vector<f64, D>], u: &[Vector<f64, D>]) -> Result<(), CheckError> {
-        self.check_along(Trial::motion(dphi), Trial::motion(u))
+    pub fn check_tangent(&self, phi: &[Vector<f64, D>], u: &[Vector<f64, D>]) -> Result<(), CheckError> {
+        self.check_along(Trial::motion(phi), Trial::motion(u))
     }
 
     /// [`Self::check_tangent`] at a trial state, in a direction that depends on `seed`. In the mixed form, the residuals and unknowns of
     /// cells belong to the product.
     pub(crate) fn check_tangent_at(&self, at: Trial<'_, f64, D>, seed: u64) -> Result<(), CheckError> {
         let of_cells: Vec<f64> = direction::<1>(at.dilatation.len(), seed + 1).iter().map(|x| x[0]).collect();
-        self.check_along(at, Trial { dphi: &direction(at.dphi.len(), seed), dilatation: &of_cells })
+        self.check_along(at, Trial { phi: &direction(at.phi.len(), seed), dilatation: &of_cells })
     }
 
     fn check_along(&self, at: Trial<'_, f64, D>, along: Trial<'_, f64, D>) -> Result<(), CheckError> {
-        let mut u = along.dphi.to_vec();
+        let mut u = along.phi.to_vec();
         self.unknowns.clear_prescribed(&mut u);
-        let (u, dphi) = (&u, &*self.unknowns.extended(at.dphi));
-        let (at, along) = (Trial { dphi, ..at }, Trial { dphi: u, ..along });
-        let bound = self.worst_bound(dphi)?;
-        self.check_claims(dphi)?;
+        let (u, phi) = (&u, &*self.unknowns.extended(at.phi));
+        let (at, along) = (Trial { phi, ..at }, Trial { phi: u, ..along });
+        let bound = self.worst_bound(phi)?;
+        self.check_claims(phi)?;
         let (mut whole, mut of_term, mut largest) = (Rows::zeros(along), 0.0, 0.0_f64);
         for piece in self.terms.pieces() {
             let dual = self.dual_rows(piece, at, along)?;
             let analytic = Rows::product(self.tangent_at(Some(piece), at)?, along);
             // The contributions of a piece may cancel, like those of pressure in 1D. Their size is then the scale of round-off.
-            let mut scale = norm(&dual.nodes).max(self.size_of(piece, dphi, u)?);
+            let mut scale = norm(&dual.nodes).max(self.size_of(piece, phi, u)?);
             if piece.part == Part::Whole {
                 of_term = scale;
             }
@@ -173,9 +174,9 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
         at: Trial<'_, f64, D>,
         along: Trial<'_, f64, D>,
     ) -> Result<Rows<D>, Inadmissible> {
-        let dphi: Vec<_> = at.dphi.iter().zip(along.dphi).map(|(x, d)| x.zip_map(d, Dual64::new)).collect();
+        let phi: Vec<_> = at.phi.iter().zip(along.phi).map(|(x, d)| x.zip_map(d, Dual64::new)).collect();
         let own: Vec<_> = at.dilatation.iter().zip(along.dilatation).map(|(&x, &d)| Dual64::new(x, d)).collect();
-        let (nodes, cells) = self.residual_at(piece, Trial { dphi: &dphi, dilatation: &own })?;
+        let (nodes, cells) = self.residual_at(piece, Trial { phi: &phi, dilatation: &own })?;
         let mut nodes: Vec<_> = nodes.iter().map(|r| r.map(|x| x.eps)).collect();
         self.unknowns.clear_prescribed(&mut nodes);
         let mut rows = Rows { nodes, cells: cells.iter().map(|x| Vector::from([x.eps])).collect() };
@@ -184,11 +185,11 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     }
 
     /// Lets the laws of a few particles compare what they claim with differences.
-    fn check_claims(&self, dphi: &[Vector<f64, D>]) -> Result<(), CheckError> {
+    fn check_claims(&self, phi: &[Vector<f64, D>]) -> Result<(), CheckError> {
         let (particles, supports) = (self.step.particles, self.step.supports);
         for p in (0..particles.len()).step_by(particles.len().div_ceil(CLAIMS).max(1)) {
-            let h_r = &particles.reference().displacement_gradient[p];
-            let at = particles.state(p, self.step.dt).deformed(compose(&supports.gradient_at(p, dphi), h_r));
+            let h = Kinematics(particles).displacement_gradient(p, &supports.gradient_at(p, phi));
+            let at = particles.state(p, self.step.dt).deformed(h);
             let law = &self.step.bodies[particles.body[p] as usize].law;
             let particle = particles.id[p] as usize;
             law.check_claim(&at).map_err(|sentence| CheckError::Claim { particle, sentence })?;
@@ -197,25 +198,23 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     }
 
     /// The largest [`tangent_bound`] of all particles.
-    fn worst_bound(&self, dphi: &[Vector<f64, D>]) -> Result<f64, Inadmissible> {
+    fn worst_bound(&self, phi: &[Vector<f64, D>]) -> Result<f64, Inadmissible> {
         if self.step.alphas.discrete_gradient {
             return Ok(LARGEST);
         }
         let particles = self.step.particles;
-        let bounds = self.step.supports.interpolate(dphi, |p, _, g| {
-            let at = MaterialState::new(compose(&g, &particles.reference().displacement_gradient[p]))
-                .admissible()
-                .map_err(|source| Inadmissible { particle: particles.id[p] as usize, source })?;
-            Ok(tangent_bound(&at.f))
-        })?;
+        let bounds = self
+            .step
+            .supports
+            .interpolate(phi, |p, _, g| Ok(tangent_bound(&Kinematics(particles).state(p, &g, 0.0)?.f)))?;
         Ok(bounds.into_iter().fold(tangent_bound(&identity::<f64, D>()), f64::max))
     }
 
     /// The size of a piece's contributions to K u where they may cancel: for loads, the force times |u|/h.
-    fn size_of(&self, piece: Piece, dphi: &[Vector<f64, D>], u: &[Vector<f64, D>]) -> Result<f64, Inadmissible> {
+    fn size_of(&self, piece: Piece, phi: &[Vector<f64, D>], u: &[Vector<f64, D>]) -> Result<f64, Inadmissible> {
         let nodes = self.step.supports.of(0).map(|(_, _, grad_n)| grad_n.norm()).fold(0.0, f64::max);
         let is_load = piece.role == Role::Loads;
-        Ok(if is_load { norm(&self.residual_of::<f64>(piece, dphi)?) * norm(u) * nodes } else { 0.0 })
+        Ok(if is_load { norm(&self.residual_of::<f64>(piece, phi)?) * norm(u) * nodes } else { 0.0 })
     }
 
     /// Compares the diagonal blocks of a few nodes with the products of unit vectors at these nodes.
@@ -258,17 +257,17 @@ struct Rows<const D: usize> {
 
 impl<const D: usize> Rows<D> {
     fn zeros(like: Trial<'_, f64, D>) -> Self {
-        Self { nodes: vec![Vector::zeros(); like.dphi.len()], cells: vec![Vector::zeros(); like.dilatation.len()] }
+        Self { nodes: vec![Vector::zeros(); like.phi.len()], cells: vec![Vector::zeros(); like.dilatation.len()] }
     }
 
     /// The product that the solver applies.
     fn product(tangent: Tangent<'_, D>, along: Trial<'_, f64, D>) -> Self {
         let mut rows = Self::zeros(along);
         if along.dilatation.is_empty() {
-            tangent.product(along.dphi, &mut rows.nodes);
+            tangent.product(along.phi, &mut rows.nodes);
             return rows;
         }
-        let x = [bytemuck::cast_slice(along.dphi), along.dilatation].concat();
+        let x = [bytemuck::cast_slice(along.phi), along.dilatation].concat();
         let mut y = vec![0.0; x.len()];
         MixedTangent { tangent }.apply(&x, &mut y);
         let (nodes, cells) = y.split_at(D * rows.nodes.len());

@@ -204,7 +204,7 @@ impl Cells {
         at: Trial<'_, T, D>,
     ) -> Vec<T> {
         if at.dilatation.is_empty() {
-            return self.changes(particles, supports, at.dphi);
+            return self.changes(particles, supports, at.phi);
         }
         let own = at.dilatation.iter().zip(&self.scales);
         own.map(|(&unknown, scale)| unknown * T::lit(scale.dilatation)).collect()

@@ -6,6 +6,7 @@ pub mod constitutive;
 pub(crate) mod contact;
 pub(crate) mod dilatation;
 mod joined_cells;
+pub(crate) mod kinematics;
 pub(crate) mod linearized;
 pub mod loads;
 mod local_form;

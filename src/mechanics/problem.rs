@@ -9,7 +9,7 @@ impl<const D: usize, L: Law> NonlinearProblem for Equilibrium<'_, D, L> {
     type Inadmissible = Inadmissible;
     fn residual(&self, x: &[f64], r: &mut [f64]) -> Result<(), Inadmissible> {
         let at = self.trial(x);
-        let (nodes, cells) = r.split_at_mut(D * at.dphi.len());
+        let (nodes, cells) = r.split_at_mut(D * at.phi.len());
         let residual = bytemuck::cast_slice_mut(nodes);
         self.residual_into(at, residual)?;
         self.unknowns.clear_prescribed(residual);

@@ -1,7 +1,8 @@
-//! The residual R(Δφ) of one step: the sum of its terms, coded once, generic over the number type (eqs. 17, 33, with the signs corrected).
+//! The residual R(φ) of one step: the sum of its terms, coded once, generic over the number type (eqs. 17, 33, with the signs corrected).
 //!
-//! Everywhere in the terms, the argument Δφ is the nodal motion since the last grid reset. With a reset in every step, as in the paper, it
-//! is the motion since t_n. Otherwise it is φ_n + Δφ, and α₁ (Δφ − Δφ̂) counts from φ_n ([`Nodal::predicted`](crate::mechanics::transfer::Nodal::predicted)).
+//! Everywhere in the terms, φ is the nodal motion since the last grid reset: φ = φ_n + Δφ, with the motion Δφ since t_n. With a reset in every
+//! step, as in the paper, φ_n = 0. φ̂ is the motion that ends without acceleration
+//! ([`Nodal::predicted`](crate::mechanics::transfer::Nodal::predicted)).
 
 use crate::material::Law;
 use crate::mechanics::constitutive::Part;
@@ -15,13 +16,13 @@ use crate::pooled::Pooled;
 use crate::solver::{Stop, vector};
 use crate::tensor::Vector;
 
-pub use crate::mechanics::constitutive::{Inadmissible, compose};
+pub use crate::mechanics::kinematics::{Inadmissible, compose};
 
-/// The equilibrium of one step: all data of R(Δφ) except Δφ. Evaluating R never changes the particles.
+/// The equilibrium of one step: all data of R(φ) except φ. Evaluating R never changes the particles.
 ///
-/// R_I = Σ_J M̃_IJ a_J + Σ_p V₀ F S ∇N_I − Σ_p m b N_I − Σ_Γ T N_I A − R₀,  a = α₁ (Δφ − Δφ̂) = α₁ Δφ − α₂ v_n − α₃ a_n
+/// R_I = Σ_J M̃_IJ a_J + Σ_p V₀ F S ∇N_I − Σ_p m b N_I − Σ_Γ T N_I A − R₀,  a = α₁ (φ − φ̂) = α₁ Δφ − α₂ v_n − α₃ a_n
 ///
-/// Where outer nodes follow inner nodes ([`aggregation`](crate::aggregation)), the residual is Eᵀ R(E Δφ). Values of outer nodes are not
+/// Where outer nodes follow inner nodes ([`aggregation`](crate::aggregation)), the residual is Eᵀ R(E φ). Values of outer nodes are not
 /// read, and the residual there is zero.
 ///
 /// ```
@@ -30,17 +31,17 @@ pub use crate::mechanics::constitutive::{Inadmissible, compose};
 ///
 /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
 /// let mut simulation = scene.build::<2>("scenes".as_ref())?;
-/// // Free fall: Δφ = β Δt² g gives a = α₁ Δφ = g, and all forces are in balance.
+/// // Free fall: φ = β Δt² g gives a = α₁ φ = g, and all forces are in balance.
 /// let (newmark, dt, g) = (Newmark::default(), 0.05, Vector::from([0.0, -10.0]));
 /// simulation.loads.gravity = Some(Gravity { acceleration: g, curve: Curve::constant(1.0) });
 /// let particles = &simulation.particles;
 /// let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
 /// let nodal = Nodal::at_rest(particles, &supports);
 /// let equilibrium = simulation.equilibrium(&supports, &nodal, &[], newmark.alphas(dt), dt);
-/// let dphi = vec![g * (newmark.beta * dt * dt); nodes.len()];
-/// let residual = equilibrium.residual(&dphi)?;
+/// let phi = vec![g * (newmark.beta * dt * dt); nodes.len()];
+/// let residual = equilibrium.residual(&phi)?;
 /// let largest = residual.iter().map(|r| r.norm()).fold(0.0, f64::max);
-/// assert!(largest < 1e-14 * equilibrium.magnitude(&dphi)?);
+/// assert!(largest < 1e-14 * equilibrium.magnitude(&phi)?);
 /// // Terms that a scene does not need are absent.
 /// assert_eq!(equilibrium.terms.pieces().iter().map(|piece| piece.name).collect::<Vec<_>>(),
 ///     ["inertia", "stress", "geometric", "material", "body force"]);
@@ -68,13 +69,13 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
         Self { step, terms: Terms::of(&step), prescribed, unknowns, mixed: false, stop: None }
     }
 
-    /// R(Δφ) at every active node. At prescribed degrees of freedom, R is the reaction.
+    /// R(φ) at every active node. At prescribed degrees of freedom, R is the reaction.
     ///
     /// # Errors
     /// det F ≤ 0. The error names the particle with the smallest id.
-    pub fn residual<T: Number>(&self, dphi: &[Vector<T, D>]) -> Result<Vec<Vector<T, D>>, Inadmissible> {
-        let mut out = vec![Vector::zeros(); dphi.len()];
-        self.residual_into(Trial::motion(dphi), &mut out)?;
+    pub fn residual<T: Number>(&self, phi: &[Vector<T, D>]) -> Result<Vec<Vector<T, D>>, Inadmissible> {
+        let mut out = vec![Vector::zeros(); phi.len()];
+        self.residual_into(Trial::motion(phi), &mut out)?;
         Ok(out)
     }
 
@@ -86,17 +87,17 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
         self.sum_into(|_, _| true, Part::Whole, Weights::Signed, at, out)
     }
 
-    /// One piece of R(Δφ). Only the occurrences of Δφ in this piece carry derivatives.
+    /// One piece of R(φ). Only the occurrences of φ in this piece carry derivatives.
     ///
     /// # Errors
     /// See [`Self::residual`].
     pub fn residual_of<T: Number>(
         &self,
         piece: Piece,
-        dphi: &[Vector<T, D>],
+        phi: &[Vector<T, D>],
     ) -> Result<Vec<Vector<T, D>>, Inadmissible> {
-        let mut out = vec![Vector::zeros(); dphi.len()];
-        self.sum_into(|name, _| name == piece.term, piece.part, Weights::Signed, Trial::motion(dphi), &mut out)?;
+        let mut out = vec![Vector::zeros(); phi.len()];
+        self.sum_into(|name, _| name == piece.term, piece.part, Weights::Signed, Trial::motion(phi), &mut out)?;
         Ok(out)
     }
 
@@ -106,7 +107,7 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
         piece: Piece,
         at: Trial<'_, T, D>,
     ) -> Result<(Vec<Vector<T, D>>, Vec<T>), Inadmissible> {
-        let mut out = vec![Vector::zeros(); at.dphi.len()];
+        let mut out = vec![Vector::zeros(); at.phi.len()];
         let picked = |name: &str, _| name == piece.term;
         self.sum_into(picked, piece.part, Weights::Signed, at, &mut out)?;
         Ok((out, self.cell_residuals(picked, at)))
@@ -114,8 +115,8 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
 
     /// The residuals of the averaged cells in the mixed form; empty in the displacement form.
     pub(crate) fn cell_residuals<T: Number>(&self, picked: impl Fn(&str, Role) -> bool, at: Trial<'_, T, D>) -> Vec<T> {
-        let dphi = &*self.unknowns.extended(at.dphi);
-        self.terms.cell_residuals(picked, Trial { dphi, ..at })
+        let phi = &*self.unknowns.extended(at.phi);
+        self.terms.cell_residuals(picked, Trial { phi, ..at })
     }
 
     /// The sum of the terms that `picked` selects: contributions at nodes, then contributions at particles in one pass.
@@ -128,17 +129,17 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
         out: &mut [Vector<T, D>],
     ) -> Result<(), Inadmissible> {
         let magnitude = weights == Weights::Magnitude;
-        let dphi = &*self.unknowns.extended(at.dphi);
+        let phi = &*self.unknowns.extended(at.phi);
         if !magnitude {
             out.fill(Vector::zeros());
-            self.terms.add_at_nodes(&picked, dphi, out);
+            self.terms.add_at_nodes(&picked, phi, out);
         }
-        let mut points = self.terms.at_points::<T>(&picked, part, Trial { dphi, ..at });
+        let mut points = self.terms.at_points::<T>(&picked, part, Trial { phi, ..at });
         // Terms that use values alone add their magnitudes at the nodes.
         points.retain(|(mode, _)| !magnitude || mode.gradient);
         let (modes, all): (Vec<_>, Vec<_>) = points.into_iter().unzip();
         if let Some(mode) = modes.into_iter().reduce(Mode::and) {
-            self.step.supports.sweep(Some(dphi), Mode { weights, ..mode }, out, |group, at, sums| {
+            self.step.supports.sweep(Some(phi), Mode { weights, ..mode }, out, |group, at, sums| {
                 for add in &all {
                     add(group, at, sums).map_err(|error| (error.particle, error))?;
                 }
@@ -155,27 +156,27 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
         Ok(())
     }
 
-    /// The external nodal forces at Δφ.
+    /// The external nodal forces at φ.
     ///
     /// # Errors
     /// See [`Self::residual`].
-    pub fn external_force(&self, dphi: &[Vector<f64, D>]) -> Result<Pooled<Vector<f64, D>>, Inadmissible> {
-        let mut force = self.forces(Role::Loads, dphi)?;
+    pub fn external_force(&self, phi: &[Vector<f64, D>]) -> Result<Pooled<Vector<f64, D>>, Inadmissible> {
+        let mut force = self.forces(Role::Loads, phi)?;
         force.iter_mut().for_each(|force| *force = -*force);
         Ok(force)
     }
 
-    /// The external nodal forces at Δφ, zero at prescribed degrees of freedom.
-    pub(crate) fn free_external_force(&self, dphi: &[Vector<f64, D>]) -> Result<Pooled<Vector<f64, D>>, Inadmissible> {
-        let mut force = self.external_force(dphi)?;
+    /// The external nodal forces at φ, zero at prescribed degrees of freedom.
+    pub(crate) fn free_external_force(&self, phi: &[Vector<f64, D>]) -> Result<Pooled<Vector<f64, D>>, Inadmissible> {
+        let mut force = self.external_force(phi)?;
         self.unknowns.clear_prescribed(&mut force);
         Ok(force)
     }
 
     /// The sum of the terms of one role.
-    pub(crate) fn forces(&self, role: Role, dphi: &[Vector<f64, D>]) -> Result<Pooled<Vector<f64, D>>, Inadmissible> {
+    pub(crate) fn forces(&self, role: Role, phi: &[Vector<f64, D>]) -> Result<Pooled<Vector<f64, D>>, Inadmissible> {
         let mut force = self.step.supports.field();
-        self.sum_into(|_, of| of == role, Part::Whole, Weights::Signed, Trial::motion(dphi), &mut force)?;
+        self.sum_into(|_, of| of == role, Part::Whole, Weights::Signed, Trial::motion(phi), &mut force)?;
         Ok(force)
     }
 
@@ -184,25 +185,25 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
     ///
     /// # Errors
     /// See [`Self::residual`].
-    pub fn magnitude(&self, dphi: &[Vector<f64, D>]) -> Result<f64, Inadmissible> {
-        self.magnitude_at(Trial::motion(dphi))
+    pub fn magnitude(&self, phi: &[Vector<f64, D>]) -> Result<f64, Inadmissible> {
+        self.magnitude_at(Trial::motion(phi))
     }
 
     pub(crate) fn magnitude_at(&self, at: Trial<'_, f64, D>) -> Result<f64, Inadmissible> {
         Ok(self.free_norm(self.magnitudes(at)?, at))
     }
 
-    /// The round-off bound: like [`Self::magnitude`], plus the change of R when Δφ and F_r are rounded.
+    /// The round-off bound: like [`Self::magnitude`], plus the change of R when φ and F_r are rounded.
     ///
     /// # Errors
     /// See [`Self::residual`].
-    pub fn sensitivity(&self, dphi: &[Vector<f64, D>]) -> Result<f64, Inadmissible> {
-        self.sensitivity_at(Trial::motion(dphi))
+    pub fn sensitivity(&self, phi: &[Vector<f64, D>]) -> Result<f64, Inadmissible> {
+        self.sensitivity_at(Trial::motion(phi))
     }
 
     pub(crate) fn sensitivity_at(&self, at: Trial<'_, f64, D>) -> Result<f64, Inadmissible> {
         let mut out = self.magnitudes(at)?;
-        self.terms.add_sensitivity(&self.unknowns.extended(at.dphi), &mut out)?;
+        self.terms.add_sensitivity(&self.unknowns.extended(at.phi), &mut out)?;
         self.unknowns.followers.restrict_magnitudes(&mut out);
         Ok(self.free_norm(out, at))
     }
@@ -217,12 +218,12 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
 
     fn magnitudes(&self, at: Trial<'_, f64, D>) -> Result<Pooled<Vector<f64, D>>, Inadmissible> {
         let mut out = self.step.supports.field();
-        self.terms.add_magnitudes_at_nodes(&self.unknowns.extended(at.dphi), &mut out);
+        self.terms.add_magnitudes_at_nodes(&self.unknowns.extended(at.phi), &mut out);
         self.sum_into(|_, _| true, Part::Whole, Weights::Magnitude, at, &mut out)?;
         Ok(out)
     }
 
-    /// The incremental potential Π(Δφ) whose gradient is R, and the sum of the magnitudes of its contributions; `None` if a term has no
+    /// The incremental potential Π(φ) whose gradient is R, and the sum of the magnitudes of its contributions; `None` if a term has no
     /// potential.
     ///
     /// ```
@@ -235,27 +236,27 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
     /// let (supports, nodes) = Supports::new(&simulation.approximation, grid, &particles.position)?;
     /// let nodal = Nodal::project(particles, &supports, 1.0)?;
     /// let equilibrium = simulation.equilibrium(&supports, &nodal, &[], simulation.settings.scheme.end(dt), dt);
-    /// // R = ∂Π/∂Δφ: along any u, the derivative of Π by dual numbers is R·u.
+    /// // R = ∂Π/∂φ: along any u, the derivative of Π by dual numbers is R·u.
     /// let u = direction::<2>(nodes.len(), 2);
-    /// let dphi: Vec<_> = direction::<2>(nodes.len(), 1).iter().map(|x| x * 0.01).collect();
-    /// let seeded: Vec<_> = dphi.iter().zip(&u).map(|(x, u)| x.zip_map(u, Dual64::new)).collect();
+    /// let phi: Vec<_> = direction::<2>(nodes.len(), 1).iter().map(|x| x * 0.01).collect();
+    /// let seeded: Vec<_> = phi.iter().zip(&u).map(|(x, u)| x.zip_map(u, Dual64::new)).collect();
     /// let slope = equilibrium.potential(&seeded).ok_or("a follower pressure has no potential")??.0.eps;
-    /// let residual = equilibrium.residual(&dphi)?;
+    /// let residual = equilibrium.residual(&phi)?;
     /// let work: f64 = residual.iter().zip(&u).map(|(r, u)| r.dot(u)).sum();
-    /// assert!((slope - work).abs() < 1e-11 * equilibrium.magnitude(&dphi)?);
+    /// assert!((slope - work).abs() < 1e-11 * equilibrium.magnitude(&phi)?);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     ///
     /// # Errors
     /// See [`Self::residual`].
-    pub fn potential<T: Number>(&self, dphi: &[Vector<T, D>]) -> Option<Result<(T, f64), Inadmissible>> {
-        self.terms.energy(&self.unknowns.extended(dphi))
+    pub fn potential<T: Number>(&self, phi: &[Vector<T, D>]) -> Option<Result<(T, f64), Inadmissible>> {
+        self.terms.energy(&self.unknowns.extended(phi))
     }
 
     /// The trial state in a vector of unknowns: those of the nodes, then those of the cells in the mixed form.
     pub(crate) fn trial<'x>(&self, x: &'x [f64]) -> Trial<'x, f64, D> {
         let (nodes, dilatation) = x.split_at(D * self.step.supports.nodes());
-        Trial { dphi: bytemuck::cast_slice(nodes), dilatation }
+        Trial { phi: bytemuck::cast_slice(nodes), dilatation }
     }
 
     /// Whether the tangent is symmetric.

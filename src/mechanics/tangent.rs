@@ -1,4 +1,4 @@
-//! The consistent tangent K(Δφ)·u, matrix-free: the terms are linearised at Δφ and applied, and K is never assembled (eqs. 30, 34, 38).
+//! The consistent tangent K(φ)·u, matrix-free: the terms are linearised at φ and applied, and K is never assembled (eqs. 30, 34, 38).
 
 use crate::lanes::LANES;
 use crate::material::Law;
@@ -17,7 +17,7 @@ use crate::solver::{LinearOperator, Linearization, LocalForm};
 use crate::tensor::{Tensor, Vector};
 use num_dual::Dual64;
 
-/// The linearisation K(Δφ) as an operator.
+/// The linearisation K(φ) as an operator.
 ///
 /// ```
 /// use bfree::mechanics::{check::direction, sweep::Supports, transfer::Nodal};
@@ -29,8 +29,8 @@ use num_dual::Dual64;
 /// let (supports, nodes) = Supports::new(&simulation.approximation, grid, &particles.position)?;
 /// let nodal = Nodal::project(particles, &supports, 1.0)?;
 /// let equilibrium = simulation.equilibrium(&supports, &nodal, &[], simulation.settings.scheme.end(dt), dt);
-/// let dphi: Vec<_> = direction::<2>(nodes.len(), 1).iter().map(|x| x * 0.01).collect();
-/// let tangent = equilibrium.tangent(&dphi)?;
+/// let phi: Vec<_> = direction::<2>(nodes.len(), 1).iter().map(|x| x * 0.01).collect();
+/// let tangent = equilibrium.tangent(&phi)?;
 /// let times = |u: &[Vector<f64, 2>]| {
 ///     let mut out = vec![Vector::zeros(); u.len()];
 ///     tangent.product(u, &mut out);
@@ -121,26 +121,26 @@ impl<'a, const D: usize> Tangent<'a, D> {
 }
 
 impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
-    /// Linearises the residual at Δφ.
+    /// Linearises the residual at φ.
     ///
     /// Example: [`Tangent`].
     ///
     /// # Errors
     /// det F ≤ 0. The error names the particle with the smallest id.
-    pub fn tangent(&self, dphi: &[Vector<f64, D>]) -> Result<Tangent<'_, D>, Inadmissible> {
-        self.tangent_of(None, dphi)
+    pub fn tangent(&self, phi: &[Vector<f64, D>]) -> Result<Tangent<'_, D>, Inadmissible> {
+        self.tangent_of(None, phi)
     }
 
-    /// Linearises one piece of the residual at Δφ, or the whole.
+    /// Linearises one piece of the residual at φ, or the whole.
     ///
     /// # Errors
     /// See [`Self::tangent`].
     pub fn tangent_of(
         &self,
         piece: impl Into<Option<Piece>>,
-        dphi: &[Vector<f64, D>],
+        phi: &[Vector<f64, D>],
     ) -> Result<Tangent<'_, D>, Inadmissible> {
-        self.tangent_at(piece.into(), Trial::motion(dphi))
+        self.tangent_at(piece.into(), Trial::motion(phi))
     }
 
     /// The linearisation at a trial state. In the mixed form it is A + Bᵀ γ B ([`mixed`](crate::mechanics::mixed)).
@@ -149,7 +149,7 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
         piece: Option<Piece>,
         at: Trial<'_, f64, D>,
     ) -> Result<Tangent<'_, D>, Inadmissible> {
-        let data = self.terms.linearize(piece, Trial { dphi: &self.unknowns.extended(at.dphi), ..at })?;
+        let data = self.terms.linearize(piece, Trial { phi: &self.unknowns.extended(at.phi), ..at })?;
         let has_inertia = !self.step.nodal.is_static();
         Ok(Tangent { mass: self.step.mass(), unknowns: self.unknowns.clone(), data, has_inertia })
     }
@@ -166,11 +166,11 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     /// let (supports, nodes) = Supports::new(&simulation.approximation, grid, &particles.position)?;
     /// let nodal = Nodal::project(particles, &supports, 1.0)?;
     /// let equilibrium = simulation.equilibrium(&supports, &nodal, &[], simulation.settings.scheme.end(dt), dt);
-    /// let dphi: Vec<_> = direction::<2>(nodes.len(), 1).iter().map(|x| x * 0.01).collect();
+    /// let phi: Vec<_> = direction::<2>(nodes.len(), 1).iter().map(|x| x * 0.01).collect();
     /// let u = direction::<2>(nodes.len(), 2);
     /// for piece in equilibrium.terms.pieces() {
-    ///     let (mut product, dual) = (vec![Vector::zeros(); nodes.len()], equilibrium.derivative(piece, &dphi, &u)?);
-    ///     equilibrium.tangent_of(piece, &dphi)?.product(&u, &mut product);
+    ///     let (mut product, dual) = (vec![Vector::zeros(); nodes.len()], equilibrium.derivative(piece, &phi, &u)?);
+    ///     equilibrium.tangent_of(piece, &phi)?.product(&u, &mut product);
     ///     let apart = product.iter().zip(&dual).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
     ///     assert!(apart < 1e-12, "{}: {apart}", piece.name);
     /// }
@@ -182,10 +182,10 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     pub fn derivative(
         &self,
         piece: Piece,
-        dphi: &[Vector<f64, D>],
+        phi: &[Vector<f64, D>],
         u: &[Vector<f64, D>],
     ) -> Result<Vec<Vector<f64, D>>, Inadmissible> {
-        let seeded: Vec<_> = dphi.iter().zip(u).map(|(x, d)| x.zip_map(d, Dual64::new)).collect();
+        let seeded: Vec<_> = phi.iter().zip(u).map(|(x, d)| x.zip_map(d, Dual64::new)).collect();
         Ok(self.residual_of(piece, &seeded)?.iter().map(|r| r.map(|x| x.eps)).collect())
     }
 }

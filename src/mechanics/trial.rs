@@ -5,8 +5,8 @@ use crate::tensor::Vector;
 /// A trial state of the unknowns.
 #[derive(Debug)]
 pub(crate) struct Trial<'x, T, const D: usize> {
-    /// φ, the nodal motion since the last grid reset, which is Δφ with a reset in every step.
-    pub dphi: &'x [Vector<T, D>],
+    /// φ, the nodal motion since the last grid reset.
+    pub phi: &'x [Vector<T, D>],
     /// The dilatation of every averaged cell in its [unit](crate::mechanics::dilatation::Scale), where it is an unknown of its own;
     /// otherwise empty.
     pub dilatation: &'x [T],
@@ -22,7 +22,7 @@ impl<T, const D: usize> Copy for Trial<'_, T, D> {}
 
 impl<'x, T, const D: usize> Trial<'x, T, D> {
     /// A motion that determines the dilatation of the cells.
-    pub fn motion(dphi: &'x [Vector<T, D>]) -> Self {
-        Self { dphi, dilatation: &[] }
+    pub fn motion(phi: &'x [Vector<T, D>]) -> Self {
+        Self { phi, dilatation: &[] }
     }
 }

@@ -89,7 +89,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             let report = newton(&equilibrium, &mut *preconditioner, &mut x, settings, supports.pool())
                 .map_err(|error| self.explained(error, &equilibrium, supports))?;
             let at = equilibrium.trial(&x);
-            phi.copy_from_slice(at.dphi);
+            phi.copy_from_slice(at.phi);
             dilatation[1] = at.dilatation.to_vec();
             report
         };

@@ -66,7 +66,7 @@ impl<const D: usize, L: Law + 'static, A: ShapeFunction + 'static> Simulation<D,
         let Balance { equilibrium, phi, dilatation: [before, after], newton, load, straight } =
             self.balance(&supports, &nodal, &prescribed)?;
         watch.lap(Phase::Newton, supports.passes());
-        self.check_tangent(&equilibrium, Trial { dphi: &phi, dilatation: &after })?;
+        self.check_tangent(&equilibrium, Trial { phi: &phi, dilatation: &after })?;
         // Forces are in balance at t_n + θ Δt. The motion is extrapolated to t_{n+1}.
         let (mut dphi, theta) = (phi, scheme.instant());
         dphi.iter_mut().zip(nodal.moved(nodes.len())).for_each(|(dphi, before)| *dphi = (*dphi - before) / theta);

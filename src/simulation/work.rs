@@ -62,7 +62,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             let share = if is_mean { 1.0 } else { 0.5 };
             match is_mean {
                 true => balanced.residual_into(Trial::motion(&middle), &mut residual)?,
-                false => start.residual_into(Trial { dphi: &before, dilatation }, &mut residual)?,
+                false => start.residual_into(Trial { phi: &before, dilatation }, &mut residual)?,
             }
             for dof in end.prescribed {
                 work += share * residual[dof.node][dof.component] * dof.step.increment;

@@ -5,10 +5,11 @@
 //! The loop of each body is chosen once a pass over the particles.
 
 use super::discrete_gradient::DiscreteGradient;
-use super::point::{self, Inadmissible, Part};
+use super::point::{self, Part};
 use super::tangents::{Form, general};
 use crate::lanes::{LANES, Lanes, WithLanes, widest};
 use crate::material::{ClosedTangent, Law, LawVisitor, Material, MaterialState, NonPositiveJacobian};
+use crate::mechanics::kinematics::Inadmissible;
 use crate::mechanics::sweep::{At, Group, Number};
 use crate::particles::{Body, Particles};
 use crate::scalar::Real;

@@ -13,5 +13,5 @@ mod tangents;
 
 pub(super) use discrete_gradient::{GAUSS, ROUND_OFF};
 pub use laws::Laws;
-pub use point::{Inadmissible, Part, compose};
+pub use point::Part;
 pub(crate) use tangents::{AddTo, Form, Product, add_quadratic, general, product};

@@ -3,19 +3,10 @@
 //! The code is generic over the number type. No function returns early, so a loop over particles is pure arithmetic. The compiler
 //! vectorises this loop if the law is pure arithmetic, too.
 
-use crate::material::{ClosedTangent, Law, MaterialState, NonPositiveJacobian, first_piola};
+use crate::material::{ClosedTangent, Law, MaterialState, first_piola};
+use crate::mechanics::kinematics::{compose, to_nodes};
 use crate::scalar::Real;
 use crate::tensor::{Tensor, identity, scaled};
-
-/// A particle with det F ≤ 0.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error("particle {particle} cannot be deformed so")]
-pub struct Inadmissible {
-    /// Id of the particle.
-    pub particle: usize,
-    /// The determinant found.
-    pub source: NonPositiveJacobian,
-}
 
 /// A part of a term's tangent that can be linearised alone. In the code for `F S`, derivatives of the left F alone give the geometric part.
 /// Derivatives of the F inside S alone give the material part.
@@ -36,24 +27,6 @@ fn carried<T: Real>(x: T, carries: bool) -> T {
     if carries { x } else { T::lit(x.value()) }
 }
 
-/// H of F = ΔF F_r with ΔF = I + G: H = G + H_r + G H_r, which loses no digits (eq. 45).
-///
-/// ```
-/// use bfree::mechanics::residual::compose;
-/// use bfree::tensor::{Tensor, identity};
-///
-/// // I + H_{n+1} = (I + G)(I + H_r); and a strain of 1e-20 is kept beside I.
-/// let (g, h_r) = (Tensor::<f64, 2>::new(0.5, 0.25, 0.0, -0.5), Tensor::<f64, 2>::new(0.0, 0.5, 0.25, 1.0));
-/// assert_eq!(identity() + compose(&g, &h_r), (identity() + g) * (identity() + h_r));
-/// assert_eq!(compose(&Tensor::<f64, 1>::zeros(), &Tensor::from_element(1e-20))[(0, 0)], 1e-20);
-/// ```
-#[inline(always)]
-pub fn compose<T: Real, const D: usize>(g: &Tensor<T, D>, h_r: &Tensor<f64, D>) -> Tensor<T, D> {
-    let h_r = h_r.map(T::lit);
-    mutant!("deformation: F without G H_r": { return g + h_r; });
-    g + h_r + g * h_r
-}
-
 /// V₀ F S F_rᵀ at ∇u = `g`, from the state `at_r`, F of the last grid reset and internal variables at t_n; its product with ∇_r N_I is the internal force on node I. Also returns det F, which the caller must check.
 /// Where det F ≤ 0, S is that of the undeformed body. Only the F of `part` carry derivatives.
 #[inline(always)]
@@ -67,10 +40,7 @@ pub(super) fn internal<L: Law, T: Real, const D: usize>(
     let h = compose(g, &at_r.h);
     let f_left = identity::<T, D>() + h.map(|x| carried(x, part != Part::Material));
     let (at, det_f) = at_r.deformed(h.map(|x| carried(x, part != Part::Geometric))).admissible_or_rest();
-    let piola = first_piola(law, &f_left, &at);
-    let f_r_t = at_r.f.transpose().map(T::lit);
-    mutant!("stress: F_r is transposed": f_r_t = f_r_t.transpose());
-    (scaled(&(piola * f_r_t), T::lit(volume)), det_f)
+    (to_nodes(&first_piola(law, &f_left, &at), &at_r.f, volume), det_f)
 }
 
 /// δσ = V₀ δP F_rᵀ as a linear map of L = Σ u ⊗ ∇_r N.

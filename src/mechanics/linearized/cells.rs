@@ -72,17 +72,17 @@ pub(crate) struct MixedCell<const D: usize> {
 
 impl<const D: usize> CellRows<D> {
     /// Cells in the displacement form. `fill(cell, particle, L, lane, rows)` writes the numbers of a particle in a cell, where L is that of
-    /// the nodal motion `dphi`.
+    /// the nodal motion `phi`.
     pub fn new(
         cells: Arc<Cells>,
         layout: CellLayout,
         stiffness: Vec<f64>,
         supports: &Supports<D>,
-        dphi: &[Vector<f64, D>],
+        phi: &[Vector<f64, D>],
         fill: impl Fn(usize, usize, &Tensor<f64, D>, usize, &mut [[f64; LANES]]) + Sync,
     ) -> Self {
         let mut rows = supports.pool().unspecified(supports.groups() * layout.count, [0.0; LANES]);
-        supports.fill_rows(dphi, layout.count, &mut rows, |group, at, rows| {
+        supports.fill_rows(phi, layout.count, &mut rows, |group, at, rows| {
             rows.fill([0.0; LANES]);
             for (lane, &p) in group.particles.iter().enumerate() {
                 if let Some(cell) = cells.cell(p) {

@@ -1,4 +1,4 @@
-//! A step linearised at one Δφ, as data, and the product that reads it. A term writes its arrays; nothing else of the term is needed afterwards.
+//! A step linearised at one φ, as data, and the product that reads it. A term writes its arrays; nothing else of the term is needed afterwards.
 //!
 //! | array | entries | its part of K u |
 //! |---|---|---|

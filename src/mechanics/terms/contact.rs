@@ -3,11 +3,12 @@
 
 use super::term::{Step, Sum, Term, summed};
 use crate::material::Law;
-use crate::mechanics::constitutive::{Inadmissible, Part};
+use crate::mechanics::constitutive::Part;
 use crate::mechanics::contact::{
     Carrier, ContactPoint, FreeBalance, FreeMotion, Surroundings, Touching, contact_modulus, obstacle_points,
     pair_points, points_on,
 };
+use crate::mechanics::kinematics::Inadmissible;
 use crate::mechanics::linearized::{ContactRow, ContactRows, Linearized};
 use crate::mechanics::loads::{Obstacle, Pose, RigidBody};
 use crate::mechanics::sweep::Number;
@@ -28,27 +29,27 @@ impl<'a, const D: usize, L: Law> ContactForce<'a, D, L> {
         acts.then(|| Self { step: *step, stiffness: penalties(step.bodies, step.supports.grid().spacing) })
     }
 
-    /// All points in contact at Δφ.
-    pub(crate) fn contact_points<T: Number>(&self, dphi: &[Vector<T, D>]) -> Vec<ContactPoint<T, D>> {
-        self.contact_points_with(&self.free_motions(dphi), dphi)
+    /// All points in contact at φ.
+    pub(crate) fn contact_points<T: Number>(&self, phi: &[Vector<T, D>]) -> Vec<ContactPoint<T, D>> {
+        self.contact_points_with(&self.free_motions(phi), phi)
     }
 
-    /// All points in contact at Δφ, with the motions of free obstacles there.
+    /// All points in contact at φ, with the motions of free obstacles there.
     fn contact_points_with<T: Number>(
         &self,
         motions: &[Option<FreeMotion>],
-        dphi: &[Vector<T, D>],
+        phi: &[Vector<T, D>],
     ) -> Vec<ContactPoint<T, D>> {
-        let (contacts, around) = (&self.step.loads.contacts, self.around(dphi));
-        let mut found = obstacle_points(contacts, &around, &self.poses(motions, dphi));
+        let (contacts, around) = (&self.step.loads.contacts, self.around(phi));
+        let mut found = obstacle_points(contacts, &around, &self.poses(motions, phi));
         found.extend(pair_points(contacts, &around));
         found
     }
 
-    /// The surroundings of the contacts at Δφ.
+    /// The surroundings of the contacts at φ.
     fn around<'x, T: Number>(
         &'x self,
-        dphi: &'x [Vector<T, D>],
+        phi: &'x [Vector<T, D>],
     ) -> Surroundings<'x, impl Fn(usize) -> f64, impl Fn(&Carrier<D>) -> Vector<T, D>, D> {
         let Step { particles, supports, time, alphas, .. } = self.step;
         let reference = particles.reference().position;
@@ -56,16 +57,16 @@ impl<'a, const D: usize, L: Law> ContactForce<'a, D, L> {
             t: time,
             start: alphas.discrete_gradient.then_some((time - alphas.dt, &*particles.position)),
             stiffness: |p: usize| self.stiffness[particles.body[p] as usize],
-            position: move |carrier: &Carrier<D>| carrier.position(reference, supports, dphi),
+            position: move |carrier: &Carrier<D>| carrier.position(reference, supports, phi),
         }
     }
 
-    /// The poses of all obstacles at Δφ, with the motions of free obstacles there.
-    fn poses<T: Number>(&self, motions: &[Option<FreeMotion>], dphi: &[Vector<T, D>]) -> Vec<Pose<D, T>> {
+    /// The poses of all obstacles at φ, with the motions of free obstacles there.
+    fn poses<T: Number>(&self, motions: &[Option<FreeMotion>], phi: &[Vector<T, D>]) -> Vec<Pose<D, T>> {
         if let Some(poses) = self.step.poses {
             return poses.iter().map(Pose::lit).collect();
         }
-        let (contacts, around) = (&self.step.loads.contacts, self.around(dphi));
+        let (contacts, around) = (&self.step.loads.contacts, self.around(phi));
         let pose = |(index, motion): (usize, &Option<FreeMotion>)| {
             let obstacle = &contacts.obstacles[index];
             let (Some(motion), Some(body)) = (motion, &obstacle.free) else {
@@ -77,13 +78,13 @@ impl<'a, const D: usize, L: Law> ContactForce<'a, D, L> {
         motions.iter().enumerate().map(pose).collect()
     }
 
-    /// The motion of each obstacle at Δφ; `None` for an obstacle that does not move freely, or whose pose is known.
-    pub(crate) fn free_motions<T: Number>(&self, dphi: &[Vector<T, D>]) -> Vec<Option<FreeMotion>> {
+    /// The motion of each obstacle at φ; `None` for an obstacle that does not move freely, or whose pose is known.
+    pub(crate) fn free_motions<T: Number>(&self, phi: &[Vector<T, D>]) -> Vec<Option<FreeMotion>> {
         let contacts = &self.step.loads.contacts;
         if self.step.poses.is_some() || !contacts.has_free_obstacle() {
             return vec![None; contacts.obstacles.len()];
         }
-        let values: Vec<Vector<f64, D>> = dphi.iter().map(|x| x.map(T::value)).collect();
+        let values: Vec<Vector<f64, D>> = phi.iter().map(|x| x.map(T::value)).collect();
         let around = self.around(&values);
         let motion = |(index, obstacle): (usize, &Obstacle<D>)| {
             let body = obstacle.free.as_ref()?;
@@ -109,8 +110,8 @@ impl<const D: usize, L: Law> Term<D> for ContactForce<'_, D, L> {
         "contact"
     }
 
-    fn add_at_nodes<T: Number>(&self, dphi: &[Vector<T, D>], out: &mut [Vector<T, D>]) {
-        for one in self.contact_points(dphi) {
+    fn add_at_nodes<T: Number>(&self, phi: &[Vector<T, D>], out: &mut [Vector<T, D>]) {
+        for one in self.contact_points(phi) {
             let force = one.force();
             mutant!("contact: the force does not turn with the obstacle": force = one.law.traction(&one.y) * T::lit(one.area));
             for carrier in &one.carriers {
@@ -122,15 +123,15 @@ impl<const D: usize, L: Law> Term<D> for ContactForce<'_, D, L> {
     }
 
     /// Σ ½ k g² A without friction. Free obstacles bring their inertia into the balance, which in space has no potential.
-    fn energy<T: Number>(&self, dphi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>> {
+    fn energy<T: Number>(&self, phi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>> {
         let energy = |one: ContactPoint<T, D>| one.law.energy(&one.y) * T::lit(one.area);
         let contacts = &self.step.loads.contacts;
         let has_potential = !contacts.have_friction() && !contacts.has_free_obstacle();
-        has_potential.then(|| Ok(summed(self.contact_points(dphi).into_iter().map(energy))))
+        has_potential.then(|| Ok(summed(self.contact_points(phi).into_iter().map(energy))))
     }
 
-    fn add_magnitudes_at_nodes(&self, dphi: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
-        for one in self.contact_points(dphi) {
+    fn add_magnitudes_at_nodes(&self, phi: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
+        for one in self.contact_points(phi) {
             let force = one.force();
             for carrier in &one.carriers {
                 let share = carrier.share.abs();
@@ -140,11 +141,11 @@ impl<const D: usize, L: Law> Term<D> for ContactForce<'_, D, L> {
     }
 
     /// The gap changes by the rounding of positions.
-    fn add_sensitivity(&self, dphi: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) -> Result<(), Inadmissible> {
+    fn add_sensitivity(&self, phi: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) -> Result<(), Inadmissible> {
         let (supports, reference) = (self.step.supports, self.step.particles.reference().position);
-        for ContactRow { carriers, tangent, .. } in self.linearized(dphi) {
+        for ContactRow { carriers, tangent, .. } in self.linearized(phi) {
             let size = |one: &Carrier<D>| {
-                let x = reference[one.particle].abs() + supports.value_at(one.particle, dphi).abs();
+                let x = reference[one.particle].abs() + supports.value_at(one.particle, phi).abs();
                 x * one.share.abs()
             };
             let change = tangent.abs() * carriers.iter().map(size).sum::<Vector<f64, D>>();
@@ -158,21 +159,21 @@ impl<const D: usize, L: Law> Term<D> for ContactForce<'_, D, L> {
 
     fn linearize(
         &self,
-        Trial { dphi, .. }: Trial<'_, f64, D>,
+        Trial { phi, .. }: Trial<'_, f64, D>,
         _: Part,
         into: &mut Linearized<D>,
     ) -> Result<(), Inadmissible> {
         let Step { loads, supports, .. } = self.step;
-        into.contacts = ContactRows::new(self.linearized(dphi), loads.contacts.obstacles.len(), supports);
+        into.contacts = ContactRows::new(self.linearized(phi), loads.contacts.obstacles.len(), supports);
         Ok(())
     }
 }
 
 impl<const D: usize, L: Law> ContactForce<'_, D, L> {
-    fn linearized(&self, dphi: &[Vector<f64, D>]) -> Vec<ContactRow<D>> {
+    fn linearized(&self, phi: &[Vector<f64, D>]) -> Vec<ContactRow<D>> {
         let contacts = &self.step.loads.contacts;
-        let motions = self.free_motions(dphi);
-        let points = self.contact_points_with(&motions, dphi);
+        let motions = self.free_motions(phi);
+        let points = self.contact_points_with(&motions, phi);
         let on_free = |one: &ContactPoint<f64, D>| {
             let Touching::Obstacle(index) = one.touching else { return None };
             let balance = self.free_balance(contacts.obstacles[index].free.as_ref()?);

@@ -6,7 +6,8 @@ use super::mean_dilatation::MeanDilatation;
 use super::stress::Stress;
 use super::term::{Role, Step, Sum, Term, summed};
 use crate::material::Law;
-use crate::mechanics::constitutive::{Inadmissible, Part};
+use crate::mechanics::constitutive::Part;
+use crate::mechanics::kinematics::Inadmissible;
 use crate::mechanics::linearized::{CellRows, Linearized, StressRows};
 use crate::mechanics::loads::Rayleigh;
 use crate::mechanics::schemes::Alphas;
@@ -66,13 +67,13 @@ impl<const D: usize, L: Law> Damping<'_, D, L> {
     }
 
     /// v = v_n + Δv at the nodes.
-    fn velocity<T: Number>(&self, dphi: &[Vector<T, D>]) -> Vec<Vector<T, D>> {
+    fn velocity<T: Number>(&self, phi: &[Vector<T, D>]) -> Vec<Vector<T, D>> {
         let Nodal { velocity, acceleration, .. } = self.step.nodal;
         let Alphas { dt, a4, a6, .. } = self.step.alphas;
-        let state = velocity.iter().zip(acceleration).zip(self.step.nodal.moved(dphi.len()));
+        let state = velocity.iter().zip(acceleration).zip(self.step.nodal.moved(phi.len()));
         let known = state.map(|((v, a), motion)| v - v * (dt * a4) + a * a6 - motion * a4);
-        let all = dphi.iter().zip(known);
-        all.map(|(dphi, known)| Vector::from_fn(|i, _| dphi[i] * T::lit(a4) + T::lit(known[i]))).collect()
+        let all = phi.iter().zip(known);
+        all.map(|(phi, known)| Vector::from_fn(|i, _| phi[i] * T::lit(a4) + T::lit(known[i]))).collect()
     }
 
     /// (a M̃ + b K_n) v for every number type, field by field: the force is linear in v.
@@ -97,20 +98,20 @@ impl<const D: usize, L: Law> Term<D> for Damping<'_, D, L> {
         Role::Dissipates
     }
 
-    fn add_at_nodes<T: Number>(&self, dphi: &[Vector<T, D>], out: &mut [Vector<T, D>]) {
-        let force = self.force_of(&self.velocity(dphi));
+    fn add_at_nodes<T: Number>(&self, phi: &[Vector<T, D>], out: &mut [Vector<T, D>]) {
+        let force = self.force_of(&self.velocity(phi));
         out.iter_mut().zip(force).for_each(|(out, force)| *out += force);
     }
 
     /// ½ v·C v/α₄, whose gradient is C v
-    fn energy<T: Number>(&self, dphi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>> {
-        let v = self.velocity(dphi);
+    fn energy<T: Number>(&self, phi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>> {
+        let v = self.velocity(phi);
         let energy = |(force, v): (&Vector<T, D>, &Vector<T, D>)| T::lit(0.5 / self.step.alphas.a4) * force.dot(v);
         Some(Ok(summed(self.force_of(&v).iter().zip(&v).map(energy))))
     }
 
-    fn add_magnitudes_at_nodes(&self, dphi: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
-        let force = self.force(&self.velocity(dphi));
+    fn add_magnitudes_at_nodes(&self, phi: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
+        let force = self.force(&self.velocity(phi));
         out.iter_mut().zip(force).for_each(|(out, force)| *out += force.abs());
     }
 

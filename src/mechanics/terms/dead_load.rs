@@ -1,7 +1,7 @@
-//! Dead loads, constant forces f on the nodes: the terms −f, with the energies −f·Δφ and without tangents.
+//! Dead loads, constant forces f on the nodes: the terms −f, with the energies −f·φ and without tangents.
 
 use super::term::{Role, Step, Sum, Term, summed};
-use crate::mechanics::constitutive::Inadmissible;
+use crate::mechanics::kinematics::Inadmissible;
 use crate::mechanics::loads::{ForceField, Pressing};
 use crate::mechanics::sweep::Number;
 use crate::pooled::Pooled;
@@ -74,9 +74,9 @@ impl<const D: usize> Term<D> for DeadLoad<D> {
         out.iter_mut().zip(self.force.iter()).for_each(|(out, force)| *out -= force.map(T::lit));
     }
 
-    fn energy<T: Number>(&self, dphi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>> {
-        let energy = |(force, dphi): (&Vector<f64, D>, &Vector<T, D>)| -force.map(T::lit).dot(dphi);
-        Some(Ok(summed(self.force.iter().zip(dphi).map(energy))))
+    fn energy<T: Number>(&self, phi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>> {
+        let energy = |(force, phi): (&Vector<f64, D>, &Vector<T, D>)| -force.map(T::lit).dot(phi);
+        Some(Ok(summed(self.force.iter().zip(phi).map(energy))))
     }
 
     fn add_magnitudes_at_nodes(&self, _: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {

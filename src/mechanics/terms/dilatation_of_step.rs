@@ -25,8 +25,9 @@ use super::mean_dilatation::State;
 use super::term::{AtPoints, Step, Sum, Term};
 use crate::lanes::LANES;
 use crate::material::{Law, NonPositiveJacobian};
-use crate::mechanics::constitutive::{GAUSS, Inadmissible, Part, ROUND_OFF, compose, general};
+use crate::mechanics::constitutive::{GAUSS, Part, ROUND_OFF, general};
 use crate::mechanics::dilatation::{Cells, Member};
+use crate::mechanics::kinematics::{Inadmissible, Kinematics};
 use crate::mechanics::linearized::{CellLayout, CellRows, Linearized};
 use crate::mechanics::sweep::{Mode, Number};
 use crate::mechanics::trial::Trial;
@@ -107,23 +108,15 @@ impl<'a, const D: usize, L: Law> DilatationOfStep<'a, D, L> {
     /// The deformations of a particle for F_½ = (I + `g`) F_r.
     fn ends<T: Number>(&self, p: usize, g: &Tensor<T, D>) -> Ends<T, D> {
         let particles = self.step.particles;
-        let (before, middle) = (
-            particles.displacement_gradient[p].map(T::lit),
-            compose(g, &particles.reference().displacement_gradient[p]),
-        );
+        let middle = Kinematics(particles).displacement_gradient(p, g);
+        let before = particles.displacement_gradient[p].map(T::lit);
         let after = scaled(&middle, T::lit(2.0)) - before;
         Ends { ends: [before, after].map(Deformation::new), middle: identity::<T, D>() + middle }
     }
 
-    /// V₀ F_rᵀ of a particle.
-    fn pull_back(&self, p: usize) -> Tensor<f64, D> {
-        let h_r = self.step.particles.reference().displacement_gradient[p];
-        (identity::<f64, D>() + h_r).transpose() * self.step.particles.volume[p]
-    }
-
-    fn means<T: Number>(&self, dphi: &[Vector<T, D>]) -> Vec<Mean<T>> {
+    fn means<T: Number>(&self, phi: &[Vector<T, D>]) -> Vec<Mean<T>> {
         let Step { particles, supports, .. } = self.step;
-        let grown = supports.evaluate(dphi, |p, _, g| {
+        let grown = supports.evaluate(phi, |p, _, g| {
             let [before, after] = self.ends(p, &g).ends.map(|at| at.j);
             (after - before) * T::lit(particles.volume[p])
         });
@@ -169,7 +162,7 @@ impl<const D: usize, L: Law> Term<D> for DilatationOfStep<'_, D, L> {
     }
 
     fn at_points<T: Number>(&self, _: Part, at: Trial<'_, T, D>) -> Option<(Mode, AtPoints<'_, T, D>)> {
-        let means = self.means(at.dphi);
+        let means = self.means(at.phi);
         Some((
             Mode::GRADIENT,
             Box::new(move |group, at, sums| {
@@ -180,7 +173,7 @@ impl<const D: usize, L: Law> Term<D> for DilatationOfStep<'_, D, L> {
                         particle: self.step.particles.id[p as usize] as usize,
                         source,
                     })?;
-                    let a = ends.force() * self.pull_back(p as usize).map(T::lit);
+                    let a = Kinematics(self.step.particles).to_nodes(p as usize, &ends.force());
                     for i in 0..D {
                         for k in 0..D {
                             sums.gradient[i][k][lane] += means[cell].pressure * a[(i, k)];
@@ -197,11 +190,11 @@ impl<const D: usize, L: Law> Term<D> for DilatationOfStep<'_, D, L> {
     }
 
     fn linearize(&self, at: Trial<'_, f64, D>, _: Part, into: &mut Linearized<D>) -> Result<(), Inadmissible> {
-        let means = self.means(at.dphi);
+        let means = self.means(at.phi);
         mutant!("mean dilatation of a step: the product lacks the coupling within a cell": { means.iter_mut().for_each(|mean| mean.stiffness = 0.0); });
         let stiffness = means.iter().map(|mean| mean.stiffness).collect();
         let (cells, layout, supports) = (self.cells.clone(), CellLayout::of_step(D), self.step.supports);
-        into.cells.push(CellRows::new(cells, layout, stiffness, supports, at.dphi, |cell, p, g, lane, rows| {
+        into.cells.push(CellRows::new(cells, layout, stiffness, supports, at.phi, |cell, p, g, lane, rows| {
             self.linearize_at(p, g, means[cell].pressure, lane, rows);
         }));
         Ok(())
@@ -211,14 +204,14 @@ impl<const D: usize, L: Law> Term<D> for DilatationOfStep<'_, D, L> {
 impl<const D: usize, L: Law> DilatationOfStep<'_, D, L> {
     /// Writes the local part, a and b of a particle to its lane.
     fn linearize_at(&self, p: usize, g: &Tensor<f64, D>, pressure: f64, lane: usize, rows: &mut [[f64; LANES]]) {
-        let (ends, pull_back) = (self.ends(p, g), self.pull_back(p));
-        let f_r = identity::<f64, D>() + self.step.particles.reference().displacement_gradient[p];
+        let (ends, kinematics) = (self.ends(p, g), Kinematics(self.step.particles));
+        let f_r = kinematics.reference(p);
         for l in 0..D {
             for j in 0..D {
                 // δF_½ for L = e_j ⊗ e_l
                 let mut of_middle = Tensor::<f64, D>::zeros();
                 of_middle.set_row(j, &f_r.row(l));
-                let change = ends.change(&of_middle) * pull_back * pressure;
+                let change = kinematics.to_nodes(p, &ends.change(&of_middle)) * pressure;
                 for k in 0..D {
                     for i in 0..D {
                         rows[general::<D>(k, l, i, j)][lane] = change[(i, k)];
@@ -226,7 +219,7 @@ impl<const D: usize, L: Law> DilatationOfStep<'_, D, L> {
                 }
             }
         }
-        let (a, b) = (ends.force() * pull_back, cofactor(&ends.ends[1].f) * pull_back * 2.0);
+        let [a, b] = [ends.force(), cofactor(&ends.ends[1].f) * 2.0].map(|one| kinematics.to_nodes(p, &one));
         let (of_a, of_b) = rows[CellLayout::of_step(D).a..].split_at_mut(D * D);
         for i in 0..D {
             for k in 0..D {

@@ -1,7 +1,8 @@
-//! Inertia, M̃ a with a = α₁ (Δφ − Δφ̂): eq. 33 with the sign corrected.
+//! Inertia, M̃ a with a = α₁ (φ − φ̂): eq. 33 with the sign corrected.
 
 use super::term::{AtPoints, Step, Sum, Term, summed};
-use crate::mechanics::constitutive::{Inadmissible, Part};
+use crate::mechanics::constitutive::Part;
+use crate::mechanics::kinematics::Inadmissible;
 use crate::mechanics::linearized::Linearized;
 use crate::mechanics::mass::Mass;
 use crate::mechanics::schemes::Alphas;
@@ -16,7 +17,7 @@ pub(crate) struct Inertia<'a, const D: usize> {
     mass: Mass<'a, D>,
     nodal: &'a Nodal<D>,
     alphas: Alphas,
-    /// Δφ̂ at the particles; empty for a lumped mass.
+    /// φ̂ at the particles; empty for a lumped mass.
     predicted: Pooled<Vector<f64, D>>,
 }
 
@@ -35,9 +36,9 @@ impl<'a, const D: usize> Inertia<'a, D> {
     }
 
     /// ε m_I and a_I of every node.
-    fn motion<T: Number>(&self, dphi: &[Vector<T, D>]) -> impl Iterator<Item = (T, Vector<T, D>)> {
-        dphi.iter().zip(self.nodal.predicted(&self.alphas)).zip(self.mass.lumped).map(|((dphi, predicted), m)| {
-            let a = Vector::from_fn(|i, _| T::lit(self.alphas.a1) * (dphi[i] - T::lit(predicted[i])));
+    fn motion<T: Number>(&self, phi: &[Vector<T, D>]) -> impl Iterator<Item = (T, Vector<T, D>)> {
+        phi.iter().zip(self.nodal.predicted(&self.alphas)).zip(self.mass.lumped).map(|((phi, predicted), m)| {
+            let a = Vector::from_fn(|i, _| T::lit(self.alphas.a1) * (phi[i] - T::lit(predicted[i])));
             (T::lit(self.mass.lumping * m), a)
         })
     }
@@ -48,8 +49,8 @@ impl<const D: usize> Term<D> for Inertia<'_, D> {
         "inertia"
     }
 
-    fn add_at_nodes<T: Number>(&self, dphi: &[Vector<T, D>], out: &mut [Vector<T, D>]) {
-        out.iter_mut().zip(self.motion(dphi)).for_each(|(out, (m, a))| *out += a * m);
+    fn add_at_nodes<T: Number>(&self, phi: &[Vector<T, D>], out: &mut [Vector<T, D>]) {
+        out.iter_mut().zip(self.motion(phi)).for_each(|(out, (m, a))| *out += a * m);
     }
 
     /// q = (1−ε) m a
@@ -68,9 +69,9 @@ impl<const D: usize> Term<D> for Inertia<'_, D> {
     }
 
     /// ½ a·M̃ a/α₁
-    fn energy<T: Number>(&self, dphi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>> {
+    fn energy<T: Number>(&self, phi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>> {
         let half_over_a1 = T::lit(0.5 / self.alphas.a1);
-        let of_nodes = self.motion(dphi).map(|(m, a)| half_over_a1 * m * a.dot(&a));
+        let of_nodes = self.motion(phi).map(|(m, a)| half_over_a1 * m * a.dot(&a));
         let (mut sum, mut magnitude) = summed(of_nodes);
         if self.mass.lumping < 1.0 {
             let half_a1 = T::lit(0.5 * self.alphas.a1);
@@ -78,7 +79,7 @@ impl<const D: usize> Term<D> for Inertia<'_, D> {
                 let u = u - self.predicted[p].map(T::lit);
                 half_a1 * T::lit(self.mass.consistent(p)) * u.dot(&u)
             };
-            let of_particles = summed(self.mass.supports.evaluate(dphi, energy));
+            let of_particles = summed(self.mass.supports.evaluate(phi, energy));
             sum += of_particles.0;
             magnitude += of_particles.1;
         }
@@ -86,11 +87,11 @@ impl<const D: usize> Term<D> for Inertia<'_, D> {
     }
 
     /// The lumped mass stands for the whole mass, also for ε < 1: the consistent part is of the same size.
-    fn add_magnitudes_at_nodes(&self, dphi: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
+    fn add_magnitudes_at_nodes(&self, phi: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
         let Alphas { a1, a2, a3, .. } = self.alphas;
         let state = self.nodal.velocity.iter().zip(&self.nodal.acceleration).zip(self.mass.lumped);
-        for ((out, dphi), ((v, a), &m)) in out.iter_mut().zip(dphi).zip(state) {
-            *out += (dphi.abs() * a1 + v.abs() * a2 + a.abs() * a3.abs()) * m;
+        for ((out, phi), ((v, a), &m)) in out.iter_mut().zip(phi).zip(state) {
+            *out += (phi.abs() * a1 + v.abs() * a2 + a.abs() * a3.abs()) * m;
         }
     }
 

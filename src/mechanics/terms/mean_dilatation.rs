@@ -5,7 +5,7 @@
 //! to W(F) of the law, which contains U(J). A cell then has one pressure, like finite elements with linear motion and constant pressure
 //! (Simo, Taylor and Pister, Comput. Methods Appl. Mech. Eng. 51, 1985). Π is a potential, so the tangent is symmetric.
 //!
-//! With T(θ) = θ U' and ∂v/∂Δφ_I = Σ a ∇_r N_I, a = V₀ J A, A = ΔF⁻ᵀ:
+//! With T(θ) = θ U' and ∂v/∂φ_I = Σ a ∇_r N_I, a = V₀ J A, A = ΔF⁻ᵀ:
 //!
 //! ```text
 //! π = ∂Π/∂v of the first sum = Σ V₀ T(θ) / v          σ = (π − T(J)/J) a
@@ -19,13 +19,14 @@
 
 use super::term::{AtPoints, Step, Sum, Term, summed};
 use crate::material::{Law, MaterialState, VolumeResponse};
-use crate::mechanics::constitutive::{Form, Inadmissible, Part, compose};
+use crate::mechanics::constitutive::{Form, Part};
 use crate::mechanics::dilatation::{Cells, Member, Scale, total};
+use crate::mechanics::kinematics::{Inadmissible, Kinematics};
 use crate::mechanics::linearized::{CellLayout, CellRows, Linearized, MixedCell};
 use crate::mechanics::sweep::{Mode, Number};
 use crate::mechanics::trial::Trial;
 use crate::scalar::Real;
-use crate::tensor::{Tensor, Vector, cofactor, identity, scaled};
+use crate::tensor::{Tensor, Vector, cofactor};
 use std::sync::Arc;
 
 /// The smallest bulk modulus in the choice of γ, relative to G.
@@ -37,7 +38,7 @@ pub(crate) struct MeanDilatation<'a, const D: usize, L> {
     cells: Arc<Cells>,
 }
 
-/// The state of a cell at one Δφ.
+/// The state of a cell at one φ.
 pub(super) struct State<T> {
     /// Θ − 1
     pub change: T,
@@ -79,7 +80,7 @@ fn at_mean<T: Real, const D: usize, L: Law>(step: &Step<'_, D, L>, p: usize, cha
     response(step, p, total(change, step.particles.reference().dilatation(p)))
 }
 
-/// The state of a particle at one Δφ.
+/// The state of a particle at one φ.
 struct Local<T: Real, const D: usize> {
     jacobian: T,
     response: VolumeResponse<T>,
@@ -99,10 +100,9 @@ impl<'a, const D: usize, L: Law> MeanDilatation<'a, D, L> {
 
     /// U at J, which the law contains already.
     fn local<T: Number>(&self, p: usize, g: &Tensor<T, D>) -> Local<T, D> {
-        let h_r = &self.step.particles.reference().displacement_gradient[p];
-        let (at, _) = MaterialState::new(compose(g, h_r)).admissible_or_rest();
-        let f_r_t = (identity::<f64, D>() + h_r).transpose().map(T::lit);
-        let a = scaled(&(cofactor(&at.f) * f_r_t), T::lit(self.step.particles.volume[p]));
+        let kinematics = Kinematics(self.step.particles);
+        let (at, _) = MaterialState::new(kinematics.displacement_gradient(p, g)).admissible_or_rest();
+        let a = kinematics.to_nodes(p, &cofactor(&at.f));
         Local { jacobian: at.jacobian, response: response(&self.step, p, at.j), a }
     }
 
@@ -118,13 +118,13 @@ impl<const D: usize, L: Law> MeanDilatation<'_, D, L> {
     /// in place of A, κ and q are those over (V₀ J)².
     fn rows(
         &self,
-        dphi: &[Vector<f64, D>],
+        phi: &[Vector<f64, D>],
         stiffness: Vec<f64>,
         local: impl Fn(usize, f64, f64, VolumeResponse<f64>) -> [f64; 2] + Sync,
     ) -> CellRows<D> {
         let closed = Form::Closed.rows(D);
         let (cells, layout) = (self.cells.clone(), CellLayout::of_potential(D));
-        CellRows::new(cells, layout, stiffness, self.step.supports, dphi, |cell, p, g, lane, rows| {
+        CellRows::new(cells, layout, stiffness, self.step.supports, phi, |cell, p, g, lane, rows| {
             let Local { jacobian, response, a } = self.local(p, g);
             for i in 0..D {
                 for k in 0..D {
@@ -142,12 +142,12 @@ impl<const D: usize, L: Law> MeanDilatation<'_, D, L> {
 
     /// The stiffness of all cells against a change of their volume, for damping: k̂ (Σ a_q : L_q) a with k̂ = Σ V₀ θ T' / v². It is symmetric and
     /// positive semidefinite.
-    pub(super) fn volumetric_stiffness(&self, dphi: &[Vector<f64, D>]) -> CellRows<D> {
-        let states = self.states(Trial::motion(dphi));
+    pub(super) fn volumetric_stiffness(&self, phi: &[Vector<f64, D>]) -> CellRows<D> {
+        let states = self.states(Trial::motion(phi));
         let volumes = self.cells.iter().map(|(_, volume)| volume);
         let stiffness =
             |(state, volume): (&State<f64>, f64)| state.stiffness + state.pressure / ((1.0 + state.change) * volume);
-        self.rows(dphi, states.iter().zip(volumes).map(stiffness).collect(), |_, _, _, _| [0.0; 2])
+        self.rows(phi, states.iter().zip(volumes).map(stiffness).collect(), |_, _, _, _| [0.0; 2])
     }
 
     /// The cells of the mixed form, with γ = k₀/v and k₀ = κ G/(κ + G).
@@ -186,7 +186,7 @@ impl<const D: usize, L: Law> MeanDilatation<'_, D, L> {
             return Vec::new();
         }
         let Step { particles, supports, .. } = self.step;
-        let of_motion = self.cells.changes(particles, supports, at.dphi);
+        let of_motion = self.cells.changes(particles, supports, at.phi);
         let own = self.cells.changes_at(particles, supports, at);
         let cells = self.cells.iter().zip(&self.cells.scales).zip(of_motion.into_iter().zip(own));
         mutant!("mixed: the residual of a cell is that of half its volume": { return cells.map(|(((_, volume), scale), (motion, own))| (motion - own) * T::lit(0.5 * scale.force * volume)).collect(); });
@@ -229,10 +229,10 @@ impl<const D: usize, L: Law> Term<D> for MeanDilatation<'_, D, L> {
         ))
     }
 
-    fn energy<T: Number>(&self, dphi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>> {
+    fn energy<T: Number>(&self, phi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>> {
         let Step { particles, supports, .. } = self.step;
-        let states = self.states(Trial::motion(dphi));
-        let energies = supports.evaluate(dphi, |p, _, g| {
+        let states = self.states(Trial::motion(phi));
+        let energies = supports.evaluate(phi, |p, _, g| {
             let Some(cell) = self.cells.cell(p as u32) else { return [T::zero(); 2] };
             let volume = T::lit(particles.volume[p]);
             let (mean, own) = (at_mean(&self.step, p, states[cell].change), self.local(p, &g).response);
@@ -244,7 +244,7 @@ impl<const D: usize, L: Law> Term<D> for MeanDilatation<'_, D, L> {
     fn linearize(&self, at: Trial<'_, f64, D>, _: Part, into: &mut Linearized<D>) -> Result<(), Inadmissible> {
         let states = self.states(at);
         let stiffness = states.iter().map(|state| state.stiffness).collect();
-        let mut rows = self.rows(at.dphi, stiffness, |cell, weight, volume, response| {
+        let mut rows = self.rows(at.phi, stiffness, |cell, weight, volume, response| {
             let of_mean = weight * states[cell].pressure;
             [of_mean - volume * response.stiffness, of_mean - volume * response.stress]
         });

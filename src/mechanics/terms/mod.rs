@@ -5,7 +5,7 @@
 //! - its value, for every number type;
 //! - its energy, if it has a potential;
 //! - the size that its round-off is relative to;
-//! - its tangent, linearised at one Δφ, as [data](super::linearized).
+//! - its tangent, linearised at one φ, as [data](super::linearized).
 //!
 //! [`Equilibrium`](super::residual::Equilibrium) sums the terms of the list. Plans and checks go through the same list.
 
@@ -34,8 +34,9 @@ use stress::Stress;
 use term::Term;
 
 use crate::material::Law;
-use crate::mechanics::constitutive::{Inadmissible, Part};
+use crate::mechanics::constitutive::Part;
 use crate::mechanics::dilatation::Cells;
+use crate::mechanics::kinematics::Inadmissible;
 use crate::mechanics::linearized::{CellLayout, Linearized};
 use crate::mechanics::sweep::{Mode, Number};
 use crate::mechanics::trial::Trial;
@@ -115,10 +116,10 @@ impl<'a, const D: usize, L: Law> Terms<'a, D, L> {
     pub(crate) fn add_at_nodes<T: Number>(
         &self,
         picked: impl Fn(&str, Role) -> bool,
-        dphi: &[Vector<T, D>],
+        phi: &[Vector<T, D>],
         out: &mut [Vector<T, D>],
     ) {
-        self.picked(picked).for_each(|any| of_term!(any, term => term.add_at_nodes(dphi, out)));
+        self.picked(picked).for_each(|any| of_term!(any, term => term.add_at_nodes(phi, out)));
     }
 
     /// The contributions at the particles of all terms that `picked` selects.
@@ -132,10 +133,10 @@ impl<'a, const D: usize, L: Law> Terms<'a, D, L> {
     }
 
     /// The sum of all energies; `None` if a term has no potential.
-    pub(crate) fn energy<T: Number>(&self, dphi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>> {
+    pub(crate) fn energy<T: Number>(&self, phi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>> {
         let (mut sum, mut magnitude) = (T::zero(), 0.0);
         for any in &self.0 {
-            match of_term!(any, term => term.energy(dphi))? {
+            match of_term!(any, term => term.energy(phi))? {
                 Ok((value, size)) => {
                     sum += value;
                     magnitude += size;
@@ -146,16 +147,16 @@ impl<'a, const D: usize, L: Law> Terms<'a, D, L> {
         Some(Ok((sum, magnitude)))
     }
 
-    pub(crate) fn add_magnitudes_at_nodes(&self, dphi: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
-        self.0.iter().for_each(|any| of_term!(any, term => term.add_magnitudes_at_nodes(dphi, out)));
+    pub(crate) fn add_magnitudes_at_nodes(&self, phi: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
+        self.0.iter().for_each(|any| of_term!(any, term => term.add_magnitudes_at_nodes(phi, out)));
     }
 
     pub(crate) fn add_sensitivity(
         &self,
-        dphi: &[Vector<f64, D>],
+        phi: &[Vector<f64, D>],
         out: &mut [Vector<f64, D>],
     ) -> Result<(), Inadmissible> {
-        self.0.iter().try_for_each(|any| of_term!(any, term => term.add_sensitivity(dphi, out)))
+        self.0.iter().try_for_each(|any| of_term!(any, term => term.add_sensitivity(phi, out)))
     }
 
     /// The cells with mean dilatation; `None` if there are none.

@@ -1,7 +1,8 @@
 //! Follower pressure, +p cof(F) N A on the particles of a surface. The tangent is exact, and not symmetric on an open surface.
 
 use super::term::{Role, Step, Sum, Term};
-use crate::mechanics::constitutive::{Inadmissible, Part, compose};
+use crate::mechanics::constitutive::Part;
+use crate::mechanics::kinematics::{Inadmissible, Kinematics};
 use crate::mechanics::linearized::{Linearized, PressureRow};
 use crate::mechanics::loads::PressurePoint;
 use crate::mechanics::sweep::{Number, Supports};
@@ -32,10 +33,10 @@ impl<const D: usize> Term<D> for Pressure<'_, D> {
         Role::Loads
     }
 
-    fn add_at_nodes<T: Number>(&self, dphi: &[Vector<T, D>], out: &mut [Vector<T, D>]) {
+    fn add_at_nodes<T: Number>(&self, phi: &[Vector<T, D>], out: &mut [Vector<T, D>]) {
         for point in &self.points {
-            let g = self.supports.gradient_at(point.particle, dphi);
-            let f = identity::<T, D>() + compose(&g, &self.particles.reference().displacement_gradient[point.particle]);
+            let g = self.supports.gradient_at(point.particle, phi);
+            let f = identity::<T, D>() + Kinematics(self.particles).displacement_gradient(point.particle, &g);
             let force = cofactor(&f) * point.force.map(T::lit);
             for (node, n, _) in self.supports.of(point.particle) {
                 out[node] += force * T::lit(n);
@@ -57,17 +58,16 @@ impl<const D: usize> Term<D> for Pressure<'_, D> {
 
     fn linearize(
         &self,
-        Trial { dphi, .. }: Trial<'_, f64, D>,
+        Trial { phi, .. }: Trial<'_, f64, D>,
         _: Part,
         into: &mut Linearized<D>,
     ) -> Result<(), Inadmissible> {
         let linearize = |point: &PressurePoint<D>| {
             let p = point.particle;
-            let f_r = identity::<f64, D>() + self.particles.reference().displacement_gradient[p];
             PressureRow {
                 particle: p,
-                delta_f: identity::<f64, D>() + self.supports.gradient_at(p, dphi),
-                force: cofactor(&f_r) * point.force,
+                delta_f: identity::<f64, D>() + self.supports.gradient_at(p, phi),
+                force: cofactor(&Kinematics(self.particles).reference(p)) * point.force,
             }
         };
         into.pressures.0.extend(self.points.iter().map(linearize));

@@ -3,12 +3,13 @@
 use super::term::{AtPoints, Step, Sum, Term, summed};
 use crate::lanes::LANES;
 use crate::material::Law;
-use crate::mechanics::constitutive::{Inadmissible, Laws, Part, compose};
+use crate::mechanics::constitutive::{Laws, Part};
+use crate::mechanics::kinematics::{Inadmissible, Kinematics};
 use crate::mechanics::linearized::{Linearized, StressRows};
 use crate::mechanics::sweep::{Mode, Number, Supports, Weights};
 use crate::mechanics::trial::Trial;
 use crate::parallel::First;
-use crate::tensor::{Tensor, Vector, identity};
+use crate::tensor::{Tensor, Vector};
 
 /// Σ_p V₀ F S F_rᵀ ∇_r N_I
 pub(crate) struct Stress<'a, const D: usize, L> {
@@ -26,14 +27,14 @@ impl<'a, const D: usize, L: Law> Stress<'a, D, L> {
         &self.laws.bodies[self.laws.particles.body[p] as usize].law
     }
 
-    /// The tangent linearised at Δφ, whole or one `part`.
-    pub(super) fn linearized(&self, dphi: &[Vector<f64, D>], part: Part) -> Result<StressRows, Inadmissible> {
+    /// The tangent linearised at φ, whole or one `part`.
+    pub(super) fn linearized(&self, phi: &[Vector<f64, D>], part: Part) -> Result<StressRows, Inadmissible> {
         let form = self.laws.form();
         let count = form.rows(D);
         let mut rows = self.supports.pool().unspecified(self.supports.groups() * count, [0.0; LANES]);
         let evaluate = self.laws.tangents(part, form);
         let failure = First::none();
-        self.supports.fill_rows(dphi, count, &mut rows, |group, at, rows| {
+        self.supports.fill_rows(phi, count, &mut rows, |group, at, rows| {
             if let Err(error) = evaluate(group, at, rows) {
                 failure.keep(error.particle, error);
             }
@@ -56,32 +57,26 @@ impl<const D: usize, L: Law> Term<D> for Stress<'_, D, L> {
         Some((Mode::GRADIENT, Box::new(self.laws.stresses(part))))
     }
 
-    fn energy<T: Number>(&self, dphi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>> {
+    fn energy<T: Number>(&self, phi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>> {
         if self.laws.discrete_gradient || !self.laws.bodies.iter().all(|body| body.law.has_potential()) {
             return None;
         }
         let particles = self.laws.particles;
-        let energies = self.supports.interpolate(dphi, |p, _, g| {
-            let id = particles.id[p] as usize;
-            let h_r = &particles.reference().displacement_gradient[p];
-            let at = particles.state(p, self.laws.dt).deformed(compose(&g, h_r)).admissible();
-            let at = at.map_err(|source| Inadmissible { particle: id, source })?;
+        let energies = self.supports.interpolate(phi, |p, _, g| {
+            let at = Kinematics(particles).state(p, &g, self.laws.dt)?;
             mutant!("stress: the energy lacks V_0": { return Ok(self.law(p).energy(&at)); });
             Ok(T::lit(particles.volume[p]) * self.law(p).energy(&at))
         });
         Some(energies.map(summed))
     }
 
-    /// ‖δP‖ ≤ ‖F‖ ‖ℂ : Fᵀ δF‖ with ‖δF‖ = ‖H‖ + Σ |Δφ| |∇_r N| ‖F_r‖. The response to a change of volume stands for all δF.
-    fn add_sensitivity(&self, dphi: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) -> Result<(), Inadmissible> {
+    /// ‖δP‖ ≤ ‖F‖ ‖ℂ : Fᵀ δF‖ with ‖δF‖ = ‖H‖ + Σ |φ| |∇_r N| ‖F_r‖. The response to a change of volume stands for all δF.
+    fn add_sensitivity(&self, phi: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) -> Result<(), Inadmissible> {
         let particles = self.laws.particles;
-        self.supports.assemble(dphi, Weights::Magnitude, out, |p, _, g| {
-            let h_r = &particles.reference().displacement_gradient[p];
-            let id = particles.id[p] as usize;
-            let at = particles.state(p, self.laws.dt).deformed(compose(&g, h_r)).admissible();
-            let at = at.map_err(|source| Inadmissible { particle: id, source })?;
-            let f_r = (identity::<f64, D>() + h_r).norm();
-            let moved: f64 = self.supports.of(p).map(|(node, _, grad_r)| dphi[node].norm() * grad_r.norm()).sum();
+        self.supports.assemble(phi, Weights::Magnitude, out, |p, _, g| {
+            let at = Kinematics(particles).state(p, &g, self.laws.dt)?;
+            let f_r = Kinematics(particles).reference(p).norm();
+            let moved: f64 = self.supports.of(p).map(|(node, _, grad_r)| phi[node].norm() * grad_r.norm()).sum();
             let response = self.law(p).elasticity(&at, &(at.f.transpose() * at.f)).norm();
             let change = response * (at.h.norm() + moved * f_r) * f_r * particles.volume[p];
             Ok((Vector::zeros(), Tensor::repeat(change)))
@@ -89,7 +84,7 @@ impl<const D: usize, L: Law> Term<D> for Stress<'_, D, L> {
     }
 
     fn linearize(&self, at: Trial<'_, f64, D>, part: Part, into: &mut Linearized<D>) -> Result<(), Inadmissible> {
-        into.stresses.push(self.linearized(at.dphi, part)?);
+        into.stresses.push(self.linearized(at.phi, part)?);
         Ok(())
     }
 }

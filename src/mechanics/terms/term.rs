@@ -1,6 +1,7 @@
 //! A term of the residual, and the data that terms are built from.
 
-use crate::mechanics::constitutive::{Inadmissible, Part};
+use crate::mechanics::constitutive::Part;
+use crate::mechanics::kinematics::Inadmissible;
 use crate::mechanics::linearized::Linearized;
 use crate::mechanics::loads::{Loads, Pose};
 use crate::mechanics::mass::Mass;
@@ -24,7 +25,7 @@ pub struct Step<'a, const D: usize, L> {
     pub supports: &'a Supports<D>,
     /// State at the nodes.
     pub nodal: &'a Nodal<D>,
-    /// The relations of a and v to Δφ.
+    /// The relations of a and v to φ.
     pub alphas: Alphas,
     /// ε, the lumped share of the mass.
     pub lumping: f64,
@@ -64,7 +65,7 @@ pub(super) fn summed<T: Number>(energies: impl IntoIterator<Item = T>) -> Sum<T>
     energies.into_iter().fold((T::zero(), 0.0), |(sum, size), energy| (sum + energy, size + energy.value().abs()))
 }
 
-/// A term of the residual R(Δφ).
+/// A term of the residual R(φ).
 pub(crate) trait Term<const D: usize>: Sync {
     /// The name of the term in checks and reports.
     fn name(&self) -> &'static str;
@@ -83,7 +84,7 @@ pub(crate) trait Term<const D: usize>: Sync {
     fn add_at_nodes<T: Number>(&self, _dphi: &[Vector<T, D>], _out: &mut [Vector<T, D>]) {}
 
     /// The contribution at the particles. Its [`Mode`] says which of u and L it reads, and which of q and σ it writes. Only the
-    /// occurrences of Δφ in `part` carry derivatives.
+    /// occurrences of φ in `part` carry derivatives.
     fn at_points<T: Number>(&self, _part: Part, _at: Trial<'_, T, D>) -> Option<(Mode, AtPoints<'_, T, D>)> {
         None
     }
@@ -92,12 +93,12 @@ pub(crate) trait Term<const D: usize>: Sync {
     ///
     /// # Errors
     /// det F ≤ 0 somewhere.
-    fn energy<T: Number>(&self, dphi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>>;
+    fn energy<T: Number>(&self, phi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>>;
 
     /// Adds the magnitudes of the contributions of [`Self::add_at_nodes`].
     fn add_magnitudes_at_nodes(&self, _dphi: &[Vector<f64, D>], _out: &mut [Vector<f64, D>]) {}
 
-    /// Adds the change of the residual when Δφ and the state are rounded, in units of eps.
+    /// Adds the change of the residual when φ and the state are rounded, in units of eps.
     ///
     /// # Errors
     /// det F ≤ 0 somewhere.

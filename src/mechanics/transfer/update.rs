@@ -4,8 +4,8 @@ use super::Nodal;
 use crate::grid::Grid;
 use crate::material::{Law, MaterialState, PLASTIC_STRAIN};
 use crate::mechanics::dilatation;
+use crate::mechanics::kinematics::{Kinematics, compose};
 use crate::mechanics::loads::PrescribedDof;
-use crate::mechanics::residual::compose;
 use crate::mechanics::schemes::Alphas;
 use crate::mechanics::smoothing::Smoothing;
 use crate::mechanics::sweep::Supports;
@@ -152,7 +152,7 @@ impl<'a, const D: usize> Update<'a, D> {
 
     /// The state of the unknowns at the end of the step.
     pub(crate) fn state(&self) -> Trial<'_, f64, D> {
-        Trial { dphi: self.motion(), dilatation: &self.dilatation }
+        Trial { phi: self.motion(), dilatation: &self.dilatation }
     }
 
     /// Applies E to the increments, so that outer nodes follow inner nodes that a wall has changed.
@@ -294,12 +294,12 @@ impl<'a, const D: usize> Update<'a, D> {
         let remembered = particles.remembered;
         let (mut next, undefined) = (particles.memory.clone(), First::none());
         if remembered > 0 || !particles.dilatation.is_empty() {
-            let before = particles.reference().displacement_gradient;
             let gradients = self.gradients(supports);
             let update = |p: usize, next: &mut [f64]| {
                 let law = &bodies[particles.body[p] as usize].law;
                 let memory = &particles.memory[p * remembered..(p + 1) * remembered];
-                let (at, det_f) = MaterialState::new(compose(&gradients[p], &before[p])).admissible_or_rest();
+                let h = Kinematics(particles).displacement_gradient(p, &gradients[p]);
+                let (at, det_f) = MaterialState::new(h).admissible_or_rest();
                 law.update_variables(&at.in_step(dt, memory), next);
                 let energy = if law.has_potential() { law.energy(&at.in_step(0.0, next)) } else { 0.0 };
                 let is_defined = det_f > 0.0 && energy.is_finite() && next.iter().all(|one| one.is_finite());

@@ -19,6 +19,8 @@ const MIDDLE: usize = 13;
 const ROWS: usize = 128;
 /// Cells whose matrices are in memory at once.
 const CELLS: usize = 64;
+/// The distance of a point of Gauss from the middle of an interval of length ½: 1/(4 √3).
+const GAUSS: f64 = 0.144_337_567_297_406_43;
 /// The number of a neighbour that does not exist.
 const NONE: u32 = u32::MAX;
 
@@ -74,26 +76,43 @@ fn place(from: [u32; 3], to: [u32; 3]) -> usize {
     x + 3 * y + 9 * z
 }
 
-/// The matrix of a coarse cell: the block of each pair (a, b) of the cell's corners, at a 2^D + b. Each of the finer cells in the coarse cell is
-/// one quadrature point.
+/// The quadrature points of a finer cell in a coarse cell, in units of the coarse grid. In a coarse cell that is full of finer cells, their
+/// centroids are enough. In any other cell, motions that are not rigid could have no energy: two points do not hold eight corners. There each
+/// finer cell, whose edge is ½, has the points of Gauss about its centroid.
+fn points<const D: usize>(centre: [f64; 3], is_full: bool) -> Vec<[f64; 3]> {
+    let middle = centre.map(|x| 0.5 * x);
+    mutant!("multigrid: one point holds a coarse cell that is not full": is_full = true);
+    if is_full {
+        return vec![middle];
+    }
+    let moved = |k: usize, upper: bool| middle[k] + if upper { GAUSS } else { -GAUSS };
+    (0..1 << D).map(|at| std::array::from_fn(|k| if k < D { moved(k, at >> k & 1 == 1) } else { middle[k] })).collect()
+}
+
+/// The matrix of a coarse cell: the block of each pair (a, b) of the cell's corners, at a 2^D + b.
 fn cell_matrix<const D: usize>(form: &LocalForm, coarse: [u32; 3], finer: &[usize]) -> Vec<Tensor<f64, D>> {
     let mut blocks = vec![Tensor::zeros(); 1 << (2 * D)];
-    for &cell in finer {
-        let hats: Vec<(f64, Vector<f64, D>)> =
-            corners::<D>(coarse, form.centres[cell].map(|x| 0.5 * x)).map(|(_, n, slope)| (n, slope)).collect();
+    let is_full = finer.len() == 1 << D;
+    let with_points = finer.iter().flat_map(|&cell| {
+        let points = points::<D>(form.centres[cell], is_full);
+        let share = (points.len() as f64).recip();
+        points.into_iter().map(move |point| (cell, point, share))
+    });
+    for (cell, point, share) in with_points {
+        let hats: Vec<(f64, Vector<f64, D>)> = corners::<D>(coarse, point).map(|(_, n, slope)| (n, slope)).collect();
         let tangent = &form.tangents[cell * D.pow(4)..(cell + 1) * D.pow(4)];
         // Gradients of the coarse hats are half as steep, so their products have the factor ¼.
         let flux = |k: usize, slope: &Vector<f64, D>| {
             let along =
                 |i: usize, j: usize| (0..D).map(|l| tangent[((i * D + k) * D + j) * D + l] * slope[l]).sum::<f64>();
-            Tensor::<f64, D>::from_fn(|i, j| 0.25 * along(i, j))
+            Tensor::<f64, D>::from_fn(|i, j| 0.25 * share * along(i, j))
         };
         for (b, (n_b, slope_b)) in hats.iter().enumerate() {
             let flux: [Tensor<f64, D>; D] = std::array::from_fn(|k| flux(k, slope_b));
             for (a, (n_a, slope_a)) in hats.iter().enumerate() {
                 let block = &mut blocks[a << D | b];
                 (0..D).for_each(|k| *block += flux[k] * slope_a[k]);
-                (0..D).for_each(|i| block[(i, i)] += form.masses[cell] * n_a * n_b);
+                (0..D).for_each(|i| block[(i, i)] += share * form.masses[cell] * n_a * n_b);
             }
         }
     }

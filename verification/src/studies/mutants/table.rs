@@ -209,6 +209,7 @@ pub(super) const FAULTS: &[ShippedFault] = &[
     fault("multigrid: no smoothing after the coarse levels", LEVELS, FOLLOWS),
     fault("multigrid: held values lead others in the matrix of the bottom level", LEVELS, POINTS),
     fault("multigrid: motions that nothing holds have no stiffness", STATICS, LEVELS),
+    fault("multigrid: one point holds a coarse cell that is not full", LEVELS, POINTS),
     fault("saddle: cells are alone in the Schur complement", INCOMPRESSIBLE, LEVELS),
     fault("saddle: the pressures have the other sign", INCOMPRESSIBLE, LEVELS),
     fault("solids: a curved surface by one plane a box", SOLIDS, PATCH),
