@@ -314,7 +314,7 @@ mod tests {
     }
 
     #[test]
-    fn each_kind_is_told_once_with_time_and_value() {
+    fn gain_and_loss_of_energy_are_told_once_with_time_and_value() {
         let mut watch = Watch::default();
         for number in 1..=20 {
             assert!(told(&mut watch, &step(number)).is_empty(), "{number}");
@@ -341,6 +341,24 @@ mod tests {
                 .iter()
                 .any(|warning| words.iter().all(|word| warning.message.contains(word)))
         );
+        assert_eq!(watch.warnings.len(), 2);
+        // At the end the loss is reported with its final size.
+        told(&mut watch, &balance(-0.2));
+        let end = last(&mut watch, 3.0, 30).map(|warning| (warning.kind, warning.time, warning.message));
+        let Some((Kind::EnergyLost, 3.0, message)) = end else { panic!("{end:?}") };
+        assert!(message.contains("2.000e-1, 5.0 %") && message.ends_with("more than 2 % since t = 2.1"), "{message}");
+        assert_eq!(last(&mut watch, 3.0, 30), None, "once");
+        // the state of the watch survives a checkpoint
+        let text = serde_json::to_string(&watch).unwrap();
+        assert_eq!(serde_json::from_str::<Watch>(&text).unwrap(), watch);
+    }
+
+    #[test]
+    fn costs_and_errors_are_told_once_with_their_values() {
+        let mut watch = Watch::default();
+        for number in 1..=35 {
+            assert!(told(&mut watch, &step(number)).is_empty(), "{number}");
+        }
         let halved = Watched { failed: 2, ..step(22) };
         assert!(
             told(&mut watch, &halved)
@@ -375,16 +393,7 @@ mod tests {
         let stagnated = Watched { stagnated: 3, ..step(26) };
         assert!(told(&mut watch, &stagnated).iter().any(|warning| warning.message.starts_with("3 linear systems")));
         assert!(told(&mut watch, &stagnated).is_empty() && told(&mut watch, &limited).is_empty(), "once");
-        assert_eq!(watch.warnings.len(), 8);
-        // At the end the loss is reported with its final size.
-        told(&mut watch, &balance(-0.2));
-        let end = last(&mut watch, 3.0, 30).map(|warning| (warning.kind, warning.time, warning.message));
-        let Some((Kind::EnergyLost, 3.0, message)) = end else { panic!("{end:?}") };
-        assert!(message.contains("2.000e-1, 5.0 %") && message.ends_with("more than 2 % since t = 2.1"), "{message}");
-        assert_eq!(last(&mut watch, 3.0, 30), None, "once");
-        // the state of the watch survives a checkpoint
-        let text = serde_json::to_string(&watch).unwrap();
-        assert_eq!(serde_json::from_str::<Watch>(&text).unwrap(), watch);
+        assert_eq!(watch.warnings.len(), 6);
     }
 
     #[test]
