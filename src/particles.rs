@@ -95,10 +95,10 @@ pub struct Particles<const D: usize> {
     pub body: Vec<u32>,
     /// Number of the particle in the order of creation, from 0.
     pub id: Vec<u32>,
-    /// Internal variables of the laws: [`Self::remembered`] numbers a particle, one particle after the other.
+    /// Internal variables of the laws: [`Self::variable_count`] numbers a particle, one particle after the other.
     pub memory: Vec<f64>,
     /// The largest number of internal variables of any law; 0 if all laws are elastic.
-    pub remembered: usize,
+    pub variable_count: usize,
     /// θ − 1 in bodies whose change of volume is averaged, 0 in other bodies. Empty if no body averages it.
     pub dilatation: Vec<f64>,
     /// The configuration of the last grid reset; `None` if the coming step resets the grid.
@@ -219,7 +219,7 @@ impl<const D: usize> Particles<D> {
             vectors.extend(vectors.get(p).copied());
         }
         self.dilatation.extend(self.dilatation.get(p).copied());
-        self.memory.extend_from_within(p * self.remembered..(p + 1) * self.remembered);
+        self.memory.extend_from_within(p * self.variable_count..(p + 1) * self.variable_count);
         new
     }
 
@@ -230,7 +230,7 @@ impl<const D: usize> Particles<D> {
         displacement_gradient.truncate(count);
         [volume, mass, &mut self.dilatation].into_iter().for_each(|numbers| numbers.truncate(count));
         [body, id].into_iter().for_each(|numbers| numbers.truncate(count));
-        memory.truncate(count * self.remembered);
+        memory.truncate(count * self.variable_count);
     }
 
     /// The reference configuration of the nodal motion φ: that of the last grid reset, or the present one if the coming step resets the
@@ -258,13 +258,13 @@ impl<const D: usize> Particles<D> {
     /// The state at t_n of the particle at the place `p` in memory, for a step of length `dt`.
     #[inline(always)]
     pub fn state(&self, p: usize, dt: f64) -> MaterialState<'_, f64, D> {
-        let internal = &self.memory[p * self.remembered..(p + 1) * self.remembered];
+        let internal = &self.memory[p * self.variable_count..(p + 1) * self.variable_count];
         MaterialState::new(self.displacement_gradient[p]).in_step(dt, internal)
     }
 
     /// Calls [`Self::set_internal_to_rest`] if a law has more internal variables than there is room for. Bodies set up in code need it.
     pub(crate) fn make_room_for_internal<L: Law>(&mut self, bodies: &[Body<L>]) {
-        if bodies.iter().any(|body| body.law.internal_variables().len() > self.remembered) {
+        if bodies.iter().any(|body| body.law.internal_variables().len() > self.variable_count) {
             self.set_internal_to_rest(bodies);
         }
         if bodies.iter().any(Body::averages) {
@@ -279,8 +279,8 @@ impl<const D: usize> Particles<D> {
 
     /// Sets the internal variables of every particle to the values at rest of its law.
     pub fn set_internal_to_rest<L: Law>(&mut self, bodies: &[Body<L>]) {
-        self.remembered = bodies.iter().map(|body| body.law.internal_variables().len()).max().unwrap_or(0);
-        let width = self.remembered;
+        self.variable_count = bodies.iter().map(|body| body.law.internal_variables().len()).max().unwrap_or(0);
+        let width = self.variable_count;
         let at_rest = |&body: &u32| {
             let names = bodies[body as usize].law.internal_variables().iter().map(|one| one.at_rest);
             names.chain(std::iter::repeat(0.0)).take(width)
@@ -344,8 +344,8 @@ impl<const D: usize> Particles<D> {
         permute(displacement_gradient, order, &mut moved);
         [volume, mass, dilatation].into_iter().for_each(|numbers| permute(numbers, order, &mut moved));
         [body, id].into_iter().for_each(|numbers| permute(numbers, order, &mut moved));
-        if self.remembered > 0 {
-            let of = |&p: &u32| self.memory[p as usize * self.remembered..][..self.remembered].iter().copied();
+        if self.variable_count > 0 {
+            let of = |&p: &u32| self.memory[p as usize * self.variable_count..][..self.variable_count].iter().copied();
             self.memory = order.iter().flat_map(of).collect();
         }
         if let Some(Configuration { position, displacement_gradient, dilatation }) = &mut self.reference {

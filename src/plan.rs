@@ -13,7 +13,7 @@ use crate::mechanics::sweep::{SupportError, Supports};
 use crate::mechanics::terms::planned;
 use crate::mechanics::unknowns::Unknowns;
 use crate::particles::Body;
-use crate::simulation::{Sharing, Simulation};
+use crate::simulation::{SharedNodes, Simulation};
 use crate::solver::{Krylov, Preconditioning};
 use crate::tensor::Vector;
 use arrays::arrays;
@@ -148,7 +148,7 @@ pub struct Plan {
     /// The points and the area assumed for each loaded surface.
     pub surfaces: Vec<SurfaceUse>,
     /// Bodies that share nodes at the start, in words.
-    pub sharing: Vec<String>,
+    pub shared_nodes: Vec<String>,
 }
 
 impl Plan {
@@ -177,7 +177,7 @@ impl Plan {
             terms: terms(simulation, &supports, cells),
             arrays: arrays(simulation, &supports, cells),
             surfaces: SurfaceUse::of(simulation),
-            sharing: sharing(simulation, &supports),
+            shared_nodes: shared_nodes(simulation, &supports),
         })
     }
 
@@ -214,18 +214,18 @@ fn mixed_cells<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, supp
 }
 
 /// Bodies that share nodes, and how far apart they are.
-fn sharing<const D: usize, L: Law, A: ShapeFunction>(
+fn shared_nodes<const D: usize, L: Law, A: ShapeFunction>(
     simulation: &Simulation<D, L, A>,
     supports: &Supports<D>,
 ) -> Vec<String> {
-    let said = |one: &Sharing| {
+    let said = |one: &SharedNodes| {
         let [a, b] = one.bodies.map(|body| &simulation.bodies[body as usize].name);
         let gap = one.gap.map_or_else(|| "more than 4".to_owned(), |gap| format!("{:.2}", gap.max(0.0)));
         format!(
             "{a:?} and {b:?} share nodes at the start, at a gap of {gap} spacings: they move as one there, and will not separate"
         )
     };
-    simulation.sharing(supports).iter().map(said).collect()
+    simulation.shared_nodes(supports).iter().map(said).collect()
 }
 
 fn terms<const D: usize, L: Law, A>(
@@ -285,7 +285,7 @@ impl Display for Plan {
             let (sides, force) = (sides.join(", "), force.join(", "));
             writeln!(f, "  surface: {load} on {points} points, area {area:.6} in all ({sides}), resultant ({force})")?;
         }
-        for bodies in &self.sharing {
+        for bodies in &self.shared_nodes {
             writeln!(f, "contact       {bodies}")?;
         }
         write!(f, "memory        {} at most at one time", BinaryBytes(self.bytes()))?;

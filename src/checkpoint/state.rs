@@ -48,7 +48,7 @@ pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) 
         body: _,
         id,
         memory,
-        remembered: _,
+        variable_count: _,
         dilatation,
         reference,
         outlines: _,

@@ -31,7 +31,7 @@ pub struct ClosedTangent<N, const D: usize> {
     /// q, times V₀.
     pub q: N,
     /// b and V₀ c, for laws with this term. A law has it at every state, or at none.
-    pub both: Option<[[[N; D]; D]; 2]>,
+    pub factors: Option<[[[N; D]; D]; 2]>,
 }
 
 impl<N, const D: usize> ClosedTangent<N, D> {
@@ -69,7 +69,7 @@ impl<N, const D: usize> ClosedTangent<N, D> {
                 out[i][k] = sum;
             }
         }
-        if let Some([b, c]) = &self.both {
+        if let Some([b, c]) = &self.factors {
             for i in 0..D {
                 let mut b_l = [zero; D];
                 for k in 0..D {
@@ -99,7 +99,7 @@ impl<N, const D: usize> ClosedTangent<N, D> {
             let (bulk_a, q_a) = (self.bulk * a[i][k], self.q * a[i][l]);
             for j in 0..D {
                 block[i][j] = (bulk_a * a[j][l]).sub_product(q_a, a[j][k]);
-                if let Some([b, c]) = &self.both {
+                if let Some([b, c]) = &self.factors {
                     block[i][j] = block[i][j].add_product(c[k][l], b[i][j]);
                 }
             }
@@ -136,14 +136,14 @@ impl<const D: usize> ClosedTangent<f64, D> {
         let (g_i, g_j) = (a * grad_i, a * grad_j);
         let block = scaled(&outer(&g_i, &g_j), self.bulk) - scaled(&outer(&g_j, &g_i), self.q)
             + scaled(&identity(), grad_i.dot(&(tensor(&self.right) * grad_j)));
-        self.both.map_or(block, |[b, c]| block + scaled(&tensor(&b), grad_i.dot(&(tensor(&c) * grad_j))))
+        self.factors.map_or(block, |[b, c]| block + scaled(&tensor(&b), grad_i.dot(&(tensor(&c) * grad_j))))
     }
 
     /// The geometric part L B alone, with B = V₀ F_r S F_rᵀ, if `geometric`; otherwise the rest.
     pub(crate) fn part(&self, b: &Tensor<f64, D>, geometric: bool) -> Self {
         if geometric {
             let nothing = [[0.0; D]; D];
-            return Self { a: nothing, right: rows(b), bulk: 0.0, q: 0.0, both: self.both.map(|_| [nothing; 2]) };
+            return Self { a: nothing, right: rows(b), bulk: 0.0, q: 0.0, factors: self.factors.map(|_| [nothing; 2]) };
         }
         Self { right: rows(&(tensor(&self.right) - b)), ..*self }
     }

@@ -127,7 +127,7 @@ impl<U: Volumetric> Law for NeoHookean<U> {
             right: rows(&scaled(&(f_r * f_r.transpose()), shear * volume)),
             bulk: U::stiffness::<f64, D>(self.lame.lambda, at) * volume,
             q: (U::stress::<f64, D>(self.lame.lambda, at) - shear) * volume,
-            both: None,
+            factors: None,
         })
     }
 }

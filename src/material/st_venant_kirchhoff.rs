@@ -77,7 +77,7 @@ impl Law for StVenantKirchhoff {
             right: rows(&scaled(&(f_r * self.stress(at) * f_r.transpose()), volume)),
             bulk: self.lame.lambda * volume,
             q: -shear,
-            both: Some([rows(&(at.f * at.f.transpose())), rows(&scaled(&(f_r * f_r.transpose()), shear))]),
+            factors: Some([rows(&(at.f * at.f.transpose())), rows(&scaled(&(f_r * f_r.transpose()), shear))]),
         })
     }
 }

@@ -98,7 +98,7 @@ impl<'a, const D: usize, L: Law> OnPath<'a, D, L> {
     }
 
     /// The cosine of the angle between φ − φ_n and d; 1 where nothing moves.
-    pub fn straight(&self, phi: &[Vector<f64, D>]) -> f64 {
+    pub fn cosine(&self, phi: &[Vector<f64, D>]) -> f64 {
         let (mut along, mut squares) = (0.0, 0.0);
         for (moved, d) in self.moved(phi) {
             along += d.dot(&moved);

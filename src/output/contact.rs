@@ -1,7 +1,7 @@
 //! Contact of bodies that share nodes: its beginning and end, the gap, and whether the bodies are pulled apart.
 
 use super::plot::rounded;
-use crate::simulation::Sharing;
+use crate::simulation::SharedNodes;
 use serde::{Deserialize, Serialize};
 
 /// Growth of the gap (in grid spacings) beyond which bodies that met during the run are pulled apart.
@@ -33,17 +33,17 @@ pub(crate) fn see(
     time: f64,
     dt: f64,
     first: bool,
-    sharing: &[Sharing],
+    shared_nodes: &[SharedNodes],
     names: &[&str],
 ) -> Vec<String> {
-    let named = |sharing: &Sharing| sharing.bodies.map(|body| names[body as usize].to_owned());
+    let named = |shared_nodes: &SharedNodes| shared_nodes.bodies.map(|body| names[body as usize].to_owned());
     for contact in contacts.iter_mut().filter(|contact| contact.until.is_none()) {
-        if !sharing.iter().any(|one| named(one) == contact.bodies) {
+        if !shared_nodes.iter().any(|one| named(one) == contact.bodies) {
             contact.until = Some(time);
         }
     }
     let mut said = Vec::new();
-    for one in sharing {
+    for one in shared_nodes {
         let (bodies, gap) = (named(one), [one.gap; 2]);
         let known = contacts.iter().position(|contact| contact.until.is_none() && contact.bodies == bodies);
         let at = known.unwrap_or(contacts.len());
@@ -64,12 +64,12 @@ pub(crate) fn see(
 impl Contact {
     /// Whether a step pulls the bodies apart. Bodies that share nodes since the start are pulled apart by a tension. Bodies that met later
     /// are pulled apart if the gap exceeds the gap at their meeting by [`MIN_OPENING`].
-    fn is_pulled(&self, now: &Sharing) -> bool {
+    fn is_pulled(&self, now: &SharedNodes) -> bool {
         let opened = self.gap[0].zip(now.gap).is_some_and(|(met, gap)| gap > met + MIN_OPENING);
         if self.from_start { now.tension.is_some() } else { opened }
     }
 
-    fn pulled_says(&self, now: &Sharing) -> String {
+    fn pulled_says(&self, now: &SharedNodes) -> String {
         let [a, b] = &self.bodies;
         let since = if self.from_start { "the start".to_owned() } else { format!("t = {}", rounded(self.since)) };
         let tension = now.tension.map_or_else(String::new, |tension| format!(" and a tension of {tension:.3e}"));
@@ -110,27 +110,27 @@ mod tests {
 
     #[test]
     fn bodies_that_meet_and_leave_are_no_warning_and_bodies_that_are_held_are() {
-        let sharing = |gap: f64, tension: Option<f64>| [Sharing { bodies: [0, 1], gap: Some(gap), tension }];
+        let shared_nodes = |gap: f64, tension: Option<f64>| [SharedNodes { bodies: [0, 1], gap: Some(gap), tension }];
         let names = ["a", "b"];
         let mut contacts = Vec::new();
         assert!(see(&mut contacts, 0.1, 0.1, true, &[], &names).is_empty() && contacts.is_empty());
         for (time, gap, tension) in [(0.2, 1.5, None), (0.3, 0.5, None), (0.4, 1.4, Some(1.0)), (0.5, 1.59, Some(1.0))]
         {
-            assert!(see(&mut contacts, time, 0.1, false, &sharing(gap, tension), &names).is_empty(), "{time}");
+            assert!(see(&mut contacts, time, 0.1, false, &shared_nodes(gap, tension), &names).is_empty(), "{time}");
         }
-        let said = see(&mut contacts, 0.6, 0.1, false, &sharing(1.7, None), &names);
+        let said = see(&mut contacts, 0.6, 0.1, false, &shared_nodes(1.7, None), &names);
         assert!(
             matches!(&said[..], [one] if one.contains("since t = 0.2") && one.contains("1.70 spacings")),
             "{said:?}"
         );
-        assert!(see(&mut contacts, 0.7, 0.1, false, &sharing(1.9, None), &names).is_empty(), "once");
+        assert!(see(&mut contacts, 0.7, 0.1, false, &shared_nodes(1.9, None), &names).is_empty(), "once");
         assert!(see(&mut contacts, 0.8, 0.1, false, &[], &names).is_empty());
         let [contact] = &contacts[..] else { panic!("one: {contacts:?}") };
         assert_eq!((contact.until, contact.pulled_apart, contact.gap), (Some(0.8), Some(0.6), [Some(1.5), Some(1.9)]));
         // For bodies in contact since the start, a tension suffices.
         let mut bonded = Vec::new();
-        assert!(see(&mut bonded, 0.1, 0.1, true, &sharing(0.0, None), &names).is_empty());
-        let said = see(&mut bonded, 0.2, 0.1, false, &sharing(0.01, Some(2.0)), &names);
+        assert!(see(&mut bonded, 0.1, 0.1, true, &shared_nodes(0.0, None), &names).is_empty());
+        let said = see(&mut bonded, 0.2, 0.1, false, &shared_nodes(0.01, Some(2.0)), &names);
         assert!(matches!(&said[..], [one] if one.contains("since the start") && one.contains("2.000e0")), "{said:?}");
         assert_eq!(bonded[0].since, 0.0);
     }

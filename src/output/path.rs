@@ -74,10 +74,10 @@ pub(crate) enum Event {
 }
 
 impl Followed {
-    /// Adds a step to `point`. `straight` is the cosine of the angle between the displacements of this step and the previous step.
-    pub(crate) fn add(&mut self, point: Point, straight: Option<f64>) -> Vec<Event> {
+    /// Adds a step to `point`. `cosine` is the cosine of the angle between the displacements of this step and the previous step.
+    pub(crate) fn add(&mut self, point: Point, cosine: Option<f64>) -> Vec<Event> {
         let mut events = Vec::new();
-        if let Some(cosine) = straight.filter(|&cosine| cosine < SHARP_BEND_COSINE) {
+        if let Some(cosine) = cosine.filter(|&cosine| cosine < SHARP_BEND_COSINE) {
             events.push(Event::Bent(cosine.clamp(-1.0, 1.0).acos().to_degrees()));
         }
         if let [.., before, last] = &self.points[..]

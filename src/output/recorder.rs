@@ -236,7 +236,7 @@ impl<const D: usize> Recorder<D> {
             step: number,
             settings,
             energies,
-            cause: Cause::of(step.touches(), step.feels_wall, !step.sharing.is_empty(), step.reset),
+            cause: Cause::of(step.touches(), step.feels_wall, !step.shared_nodes.is_empty(), step.reset),
             cost,
             failed: step.failed.iter().filter(|attempt| !attempt.inaccurate).count(),
             error: step.error,
@@ -247,7 +247,7 @@ impl<const D: usize> Recorder<D> {
         self.so_far.watch.see(&seen);
         self.see_contacts(&seen, simulation, step);
         if settings.scheme.follows_path() {
-            self.so_far.watch.see_path(&seen, Point::of(simulation, &self.reference), step.straight);
+            self.so_far.watch.see_path(&seen, Point::of(simulation, &self.reference), step.cosine);
         }
         self.so_far.watch.warnings[known..].iter().for_each(|warning| self.progress.warn(warning));
         self.progress.show(time, number, &cost, settings.scheme.has_inertia().then_some(energies.balance));
@@ -284,7 +284,7 @@ impl<const D: usize> Recorder<D> {
             self.so_far.watch.see_depth(seen, &place, "contact.stiffness", contact.depth / simulation.grid.spacing);
         }
         let names: Vec<&str> = simulation.bodies.iter().map(|body| body.name.as_str()).collect();
-        self.so_far.watch.see_contact(seen, &step.sharing, &names);
+        self.so_far.watch.see_contact(seen, &step.shared_nodes, &names);
     }
 
     /// Writes the last snapshot and the report. The report includes the entries `asked` of the caller, such as the scene and the command

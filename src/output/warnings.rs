@@ -6,7 +6,7 @@ use super::contact::{self, Contact};
 use super::history::{Cost, Energies};
 use super::losses::{Cause, Losses};
 use super::path::{self, Event, Followed};
-use crate::simulation::{Settings, Sharing};
+use crate::simulation::{Settings, SharedNodes};
 use crate::solver::{NewtonSettings, Preconditioning};
 use serde::{Deserialize, Serialize};
 
@@ -213,17 +213,17 @@ impl Watch {
     }
 
     /// Examines the bodies that share nodes after a step. Warns of each pair of bodies that sticks together from now on.
-    pub(crate) fn see_contact(&mut self, step: &Watched, sharing: &[Sharing], names: &[&str]) {
+    pub(crate) fn see_contact(&mut self, step: &Watched, shared_nodes: &[SharedNodes], names: &[&str]) {
         let Watched { time, cost, step, .. } = *step;
-        let said = contact::see(&mut self.contacts, time, cost.dt, step == 1, sharing, names);
+        let said = contact::see(&mut self.contacts, time, cost.dt, step == 1, shared_nodes, names);
         let warning = |message| Warning { kind: Kind::BodiesStick, time, step, message };
         self.warnings.extend(said.into_iter().map(warning));
     }
 
-    /// Warns of events in a step along the equilibrium path, to `point`. `straight` is the cosine of the angle between the displacements of
+    /// Warns of events in a step along the equilibrium path, to `point`. `cosine` is the cosine of the angle between the displacements of
     /// this step and the previous step.
-    pub(crate) fn see_path(&mut self, step: &Watched, point: path::Point, straight: Option<f64>) {
-        for event in self.path.add(point, straight) {
+    pub(crate) fn see_path(&mut self, step: &Watched, point: path::Point, cosine: Option<f64>) {
+        for event in self.path.add(point, cosine) {
             let (kind, text) = match event {
                 Event::Turned(load) => (
                     Kind::PathTurned,

@@ -71,7 +71,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Inventory<'_, D, L, A> {
 
     fn particle_data(&self) -> Vec<Row> {
         let (settings, count) = (&self.simulation.settings, self.particles);
-        let remembered = self.simulation.particles.remembered;
+        let variable_count = self.simulation.particles.variable_count;
         let consistent = self.has_inertia && settings.lumping < 1.0;
         let smooths = self.has_inertia && settings.smoothing.is_some();
         let fits = self.has_inertia && settings.projection == Projection::Affine;
@@ -79,7 +79,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Inventory<'_, D, L, A> {
         vec![
             (true, "particles: x, H, volume, mass, body, id", count * Particles::<D>::BYTES),
             (self.has_inertia, "particles: v, a", count * 2 * Self::VECTOR),
-            (remembered > 0, "particles: memory of laws", count * remembered * NUMBER),
+            (variable_count > 0, "particles: memory of laws", count * variable_count * NUMBER),
             // The prediction at the start and at the end of the step.
             (consistent, "particles: prediction for the consistent inertia", count * 2 * Self::VECTOR),
             // The part of the field that nodes cannot represent, its change, and the change of the other field.

@@ -26,7 +26,7 @@ pub(super) struct Balance<'a, const D: usize, L> {
     /// The argument of the load curves at the solution: the time, or λ on an equilibrium path.
     pub load: f64,
     /// On an equilibrium path, the cosine of the angle between this Δφ and the last one.
-    pub straight: Option<f64>,
+    pub cosine: Option<f64>,
 }
 
 impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
@@ -65,7 +65,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         phi.iter_mut().zip(&nodal.motion).for_each(|(phi, before)| *phi += before);
         self.meet_obstacles(&equilibrium, prescribed, &mut phi)?;
         let mut preconditioner = self.preconditioner().0.anew::<D>();
-        let (mut straight, mut dilatation) = (None, [Vec::new(), Vec::new()]);
+        let (mut cosine, mut dilatation) = (None, [Vec::new(), Vec::new()]);
         let newton = if scheme.follows_path() && !self.history.resets_grid() {
             let start = under(self.load());
             let force = |load| under(load).free_external_force(&nodal.motion);
@@ -73,7 +73,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             let x = bytemuck::cast_slice_mut(&mut phi);
             let report = newton(&path, &mut *preconditioner, x, settings, supports.pool())?;
             load = path.load(&phi);
-            straight = Some(path.straight(&phi));
+            cosine = Some(path.cosine(&phi));
             if path.ends(load)? {
                 return Err(StepError::PathEnds { load });
             }
@@ -94,7 +94,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             report
         };
         equilibrium.unknowns.followers.extend(&mut phi);
-        Ok(Balance { equilibrium, phi, dilatation, newton, load, straight })
+        Ok(Balance { equilibrium, phi, dilatation, newton, load, cosine })
     }
 
     /// Adds the cause to an error of Newton's method: without inertia, a body that nothing holds has no equilibrium.

@@ -22,7 +22,7 @@ pub use history::History;
 pub use next_step::NextStep;
 pub use report::{AdvanceError, BareParticle, ContactForces, FailedAttempt, StepError, StepReport};
 pub use settings::{InitialGuess, Settings};
-pub use touching::Sharing;
+pub use touching::SharedNodes;
 
 use crate::approximation::{Approximation, ShapeFunction};
 use crate::clock::Clock;

@@ -1,6 +1,6 @@
 //! Reports and errors of a step.
 
-use super::Sharing;
+use super::SharedNodes;
 use crate::causes;
 use crate::mechanics::check::CheckError;
 use crate::mechanics::loads::Reaction;
@@ -35,9 +35,9 @@ pub struct StepReport<const D: usize> {
     /// Whether a contact, a prescribed condition outside [`History::constrained`](super::History::constrained), has active nodes in this step.
     pub feels_wall: bool,
     /// Bodies that share nodes.
-    pub sharing: Vec<Sharing>,
+    pub shared_nodes: Vec<SharedNodes>,
     /// On an equilibrium path, the cosine of the angle between this Δφ and the last one; `None` in the first step after a grid reset.
-    pub straight: Option<f64>,
+    pub cosine: Option<f64>,
     /// Share of the volume of plastic bodies that flowed plastically in this step.
     pub yielding: f64,
     /// Seconds, and passes over the particles, by phase.

@@ -18,7 +18,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     pub(super) fn supports(&mut self) -> Result<Supports<D>, SupportError> {
         let resets = self.history.resets_grid();
         match self.workspace.supports.take() {
-            Some(supports) if !resets && self.workspace.supports_are_valid => Ok(supports.again()),
+            Some(supports) if !resets && self.workspace.supports_are_valid => Ok(supports.with_no_pass()),
             spare => {
                 let mut supports = self.unaggregated(spare)?;
                 if let Some(order) = supports.block_order() {

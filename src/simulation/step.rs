@@ -63,7 +63,7 @@ impl<const D: usize, L: Law + 'static, A: ShapeFunction + 'static> Simulation<D,
         let nodal = projected.with_prescribed(&prescribed).extended(&Unknowns::new(&supports, &prescribed));
         watch.lap(Phase::Projection, supports.passes());
 
-        let Balance { equilibrium, phi, dilatation: [before, after], newton, load, straight } =
+        let Balance { equilibrium, phi, dilatation: [before, after], newton, load, cosine } =
             self.balance(&supports, &nodal, &prescribed)?;
         watch.lap(Phase::Newton, supports.passes());
         self.check_tangent(&equilibrium, Trial { phi: &phi, dilatation: &after })?;
@@ -83,7 +83,7 @@ impl<const D: usize, L: Law + 'static, A: ShapeFunction + 'static> Simulation<D,
         // Nothing fails from here on.
         let (reset, feels_wall) = (self.history.resets_grid(), self.feels_wall(&prescribed));
         let yielding = self.accept(update, &projected, &prescribed, &accounts, &supports);
-        let sharing = self.sharing(&supports);
+        let shared_nodes = self.shared_nodes(&supports);
         if scheme.follows_path() {
             self.path = self.path.after(load, &dphi, dt);
         }
@@ -102,8 +102,8 @@ impl<const D: usize, L: Law + 'static, A: ShapeFunction + 'static> Simulation<D,
             error,
             reset,
             feels_wall,
-            sharing,
-            straight,
+            shared_nodes,
+            cosine,
             yielding,
             seconds: *watch,
             failed: Vec::new(),

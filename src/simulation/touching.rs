@@ -24,7 +24,7 @@ const ENCLOSED: f64 = 0.25;
 
 /// Two bodies that share nodes, at the end of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sharing {
+pub struct SharedNodes {
     /// Numbers of the bodies, the lower one first.
     pub bodies: [u32; 2],
     /// The smallest distance between the surfaces, in grid spacings: the distance of the two nearest particles less half of both widths.
@@ -48,7 +48,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// let scene = bfree::scene::read_file("scenes/collision.json".as_ref(), &[])?;
     /// let mut simulation = scene.build::<2>("scenes".as_ref())?;
     /// let shared = |of: &bfree::simulation::Simulation<2>| -> Result<_, Box<dyn std::error::Error>> {
-    ///     Ok(of.sharing(&Supports::new(&of.approximation, &of.grid, &of.particles.position)?.0))
+    ///     Ok(of.shared_nodes(&Supports::new(&of.approximation, &of.grid, &of.particles.position)?.0))
     /// };
     /// assert!(shared(&simulation)?.is_empty());
     /// let particles = &mut simulation.particles;
@@ -58,9 +58,9 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// assert!(found[0].gap.is_some_and(|gap| gap.abs() < 1.0));
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn sharing(&self, supports: &Supports<D>) -> Vec<Sharing> {
+    pub fn shared_nodes(&self, supports: &Supports<D>) -> Vec<SharedNodes> {
         let interfaces = self.interfaces(supports).into_iter();
-        let of = |(bodies, sides)| Sharing { bodies, gap: self.gap(&sides), tension: self.tension(bodies, &sides) };
+        let of = |(bodies, sides)| SharedNodes { bodies, gap: self.gap(&sides), tension: self.tension(bodies, &sides) };
         interfaces.map(of).collect()
     }
 

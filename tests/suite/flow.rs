@@ -326,7 +326,7 @@ fn flow_has_the_same_bits_for_any_threads_and_after_a_restart() -> Result<(), Fa
         let mut continued = restored(&simulation, &start)?;
         run(&mut continued)?;
         assert_eq!(continued.particles.by_id(), one);
-        let (particles, width) = (&continued.particles, continued.particles.remembered);
+        let (particles, width) = (&continued.particles, continued.particles.variable_count);
         for (field, name) in [(Field::PlasticStrain, PLASTIC_STRAIN), (Field::DissipatedDensity, DISSIPATED)] {
             let shown = field.values(&continued, &Reference::of(&continued))?;
             let place = continued.bodies[0].law.internal_variables().iter().position(|one| one.name == name);

@@ -33,7 +33,7 @@ pub struct Laws<'a, const D: usize, L> {
 type Rows<T> = [[T; LANES]; 9];
 
 /// The rows of a closed tangent, the longest form that vector lanes write.
-type ClosedRows = [[f64; LANES]; Form::ClosedWithBoth.rows(3)];
+type ClosedRows = [[f64; LANES]; Form::ClosedWithFactors.rows(3)];
 
 /// The states of the particles of a group, a lane each. Empty lanes hold zeros.
 struct States<'a, T> {
@@ -225,7 +225,7 @@ fn material<L: Law>(law: &L) -> Option<&Material> {
 fn form<L: Law, const D: usize>(law: &L) -> Form {
     match law.closed(&identity::<f64, D>(), &MaterialState::new(Tensor::zeros()), 1.0) {
         None => Form::General,
-        Some(closed) if closed.both.is_some() => Form::ClosedWithBoth,
+        Some(closed) if closed.factors.is_some() => Form::ClosedWithFactors,
         Some(_) => Form::Closed,
     }
 }
@@ -262,13 +262,13 @@ fn tangents_of<const D: usize>(
     out: &mut [[f64; LANES]],
     det_f: &mut [f64; LANES],
 ) {
-    let mut rows: ClosedRows = [[0.0; LANES]; Form::ClosedWithBoth.rows(3)];
+    let mut rows: ClosedRows = [[0.0; LANES]; Form::ClosedWithFactors.rows(3)];
     for lane in 0..LANES {
         let (gradient, at_r, volume) = states.of_lane::<D>(lane);
         let (tangent, det) = linearize(lane, &at_r, &gradient, volume);
         det_f[lane] = det;
         match (tangent, form) {
-            (point::LocalTangent::Closed(closed), Form::Closed | Form::ClosedWithBoth) => {
+            (point::LocalTangent::Closed(closed), Form::Closed | Form::ClosedWithFactors) => {
                 write(&closed, form, &mut rows, lane);
             }
             (tangent, _) => {
@@ -306,7 +306,7 @@ fn write<const D: usize>(closed: &ClosedTangent<f64, D>, form: Form, out: &mut C
     write_upper(&closed.right, out, D * D, lane);
     out[scalars][lane] = closed.bulk;
     out[scalars + 1][lane] = closed.q;
-    if let (Some([b, c]), Form::ClosedWithBoth) = (&closed.both, form) {
+    if let (Some([b, c]), Form::ClosedWithFactors) = (&closed.factors, form) {
         write_upper(b, out, scalars + 2, lane);
         write_upper(c, out, scalars + 2 + symmetric, lane);
     }

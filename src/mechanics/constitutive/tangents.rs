@@ -10,7 +10,7 @@ pub(crate) enum Form {
     /// A, B, κ and q of a [`ClosedTangent`].
     Closed,
     /// A, B, κ and q, then b and c.
-    ClosedWithBoth,
+    ClosedWithFactors,
     /// 𝔸 itself, as the blocks 𝔸_kl of all pairs of unit gradients (e_k, e_l).
     General,
 }
@@ -22,7 +22,7 @@ impl Form {
         let closed = dimension * dimension + symmetric + 2;
         match self {
             Self::Closed => closed,
-            Self::ClosedWithBoth => closed + 2 * symmetric,
+            Self::ClosedWithFactors => closed + 2 * symmetric,
             Self::General => dimension.pow(4),
         }
     }
@@ -41,9 +41,10 @@ impl Form {
         let right = symmetric(s, rows, &mut at);
         let (bulk, q) = (s.load(&rows[at]), s.load(&rows[at + 1]));
         at += 2;
-        let with_both = self == Self::ClosedWithBoth;
-        let both = if with_both { Some([symmetric(s, rows, &mut at), symmetric(s, rows, &mut at)]) } else { None };
-        ClosedTangent { a, right, bulk, q, both }
+        let with_factors = self == Self::ClosedWithFactors;
+        let factors =
+            if with_factors { Some([symmetric(s, rows, &mut at), symmetric(s, rows, &mut at)]) } else { None };
+        ClosedTangent { a, right, bulk, q, factors }
     }
 }
 
@@ -91,7 +92,7 @@ impl<const D: usize> WithLanes for In<Product<'_>, D, D> {
         }
         let product = match form {
             Form::Closed => Form::Closed.read::<S, D>(s, rows).product(&gradient),
-            Form::ClosedWithBoth => Form::ClosedWithBoth.read::<S, D>(s, rows).product(&gradient),
+            Form::ClosedWithFactors => Form::ClosedWithFactors.read::<S, D>(s, rows).product(&gradient),
             Form::General => {
                 // δσ e_k = Σ_l 𝔸_kl L e_l
                 let mut product = [[s.splat(0.0); D]; D];

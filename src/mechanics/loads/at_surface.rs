@@ -39,7 +39,7 @@ pub(crate) fn at_surface_points<'a, const D: usize>(
     for (&p, x) in &below {
         points.positions.to_mut()[p as usize] = *x;
     }
-    points.continued = on_surface.into_iter().map(|(p, x)| (p, x - points.positions[p as usize])).collect();
+    points.extrapolation = on_surface.into_iter().map(|(p, x)| (p, x - points.positions[p as usize])).collect();
     points
 }
 

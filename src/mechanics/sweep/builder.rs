@@ -48,7 +48,7 @@ impl<const D: usize> Builder<'_, D> {
         for (k, along) in scratch.along.iter_mut().enumerate().take(D) {
             along.x.clear();
             along.x.extend(keys.iter().map(|key| self.points.positions[key.particle as usize][k]));
-            along.continue_by(k, keys, self.points);
+            along.set_extrapolation(k, keys, self.points);
             self.family.spans(&self.grid.axis(k), along)?;
             let [low, high] = union(&along.spans);
             block.size[k] = (high - low) as usize;

@@ -36,17 +36,17 @@ pub(super) struct Along {
     /// Whether a wall cuts off some of the particle's nodes.
     cut: Vec<bool>,
     /// The distance by which functions are continued linearly, of points on a loaded surface, by their index in the block.
-    continued: BTreeMap<usize, f64>,
+    extrapolation: BTreeMap<usize, f64>,
     list: AxisWeights,
 }
 
 impl Along {
     /// Takes from `points` the distances by which the functions of the particles `keys` are continued along axis `k`.
-    pub(super) fn continue_by<const D: usize>(&mut self, k: usize, keys: &[Key], points: &Points<'_, D>) {
-        self.continued.clear();
-        if !points.continued.is_empty() {
-            let of = |(i, key): (usize, &Key)| Some((i, points.continued.get(&key.particle)?[k]));
-            self.continued.extend(keys.iter().enumerate().filter_map(of));
+    pub(super) fn set_extrapolation<const D: usize>(&mut self, k: usize, keys: &[Key], points: &Points<'_, D>) {
+        self.extrapolation.clear();
+        if !points.extrapolation.is_empty() {
+            let of = |(i, key): (usize, &Key)| Some((i, points.extrapolation.get(&key.particle)?[k]));
+            self.extrapolation.extend(keys.iter().enumerate().filter_map(of));
         }
     }
 }
@@ -73,7 +73,7 @@ impl<'a> Family<'a> {
                 along.spans.push(span(&along.list));
             }
         }
-        for &i in along.continued.keys() {
+        for &i in along.extrapolation.keys() {
             approximation::list(self.at_surface, axis, along.x[i], &mut along.list)?;
             along.spans[i] = span(&along.list);
         }
@@ -109,7 +109,7 @@ impl<'a> Family<'a> {
         }
         for (lane, i) in range.clone().enumerate() {
             out.spans[lane] = along.spans[i];
-            if let Some(by) = along.continued.get(&i) {
+            if let Some(by) = along.extrapolation.get(&i) {
                 let list = &mut along.list;
                 approximation::list(self.at_surface, axis, along.x[i], list)?;
                 list.values.iter_mut().zip(&list.derivatives).for_each(|(n, dn)| *n += by * dn);

@@ -1,7 +1,7 @@
 //! The passes over all particles: the particle-to-grid and grid-to-particle transfers that the rest of the program calls.
 
 use super::kernel::At;
-use super::supports::{Way, either};
+use super::supports::{Implementation, dispatch};
 use super::{AtParticle, Group, Mode, Number, Quadratic, Supports, Weights};
 use crate::lanes::LANES;
 use crate::parallel::First;
@@ -32,7 +32,7 @@ impl<const D: usize> Supports<D> {
         };
         let field = field.map(T::flat);
         T::add_flat(out, |out| {
-            either!(self, way => way.sweep::<C>(T::FIELDS, field.as_deref(), mode, out, &point));
+            dispatch!(self, one => one.sweep::<C>(T::FIELDS, field.as_deref(), mode, out, &point));
         });
         failure.check()
     }
@@ -61,14 +61,14 @@ impl<const D: usize> Supports<D> {
         fill: impl Fn(Group<'_>, &At<f64, D, D>, &mut [[f64; LANES]]) + Sync,
     ) {
         self.pass();
-        either!(self, way => way.fill_rows(bytemuck::cast_slice(field), count, rows, &fill));
+        dispatch!(self, one => one.fill_rows(bytemuck::cast_slice(field), count, rows, &fill));
     }
 
     /// `out_I +=` Σ_p B_p(∇_r N_I, ∇_r N_I) + m_p N_I² I, the nodal diagonal blocks of quadratic forms. `quadratic` fills in the form of
     /// each group.
     pub(crate) fn blocks(&self, out: &mut [Tensor<f64, D>], quadratic: &(dyn Fn(Group<'_>, &mut Quadratic) + Sync)) {
         self.pass();
-        either!(self, way => way.blocks(out, quadratic));
+        dispatch!(self, one => one.blocks(out, quadratic));
     }
 
     /// `out_I += Σ_p σ_p ∇_r N_I + q_p N_I` with `(q_p, σ_p) = point(p, u_p, ∇u_p)`, u_p = Σ u_I N_I and
@@ -220,8 +220,8 @@ impl<const D: usize> Supports<D> {
                 *result = point(p as usize, at, lane);
             }
         };
-        either!(self, way => way.gather(fields, field, mode, &evaluate, results));
-        if let Way::Tiled(tiled) = &self.way {
+        dispatch!(self, one => one.gather(fields, field, mode, &evaluate, results));
+        if let Implementation::Tiled(tiled) = &self.implementation {
             tiled.to_memory_order(results);
         }
     }

@@ -225,11 +225,11 @@ fn lists<A: ShapeFunction, const D: usize>(
         approximation
             .evaluate(grid, &points.positions[p as usize], &mut scratch, &mut support)
             .map_err(|source| SupportError { particle: points.id(p as usize), source })?;
-        let (continued, field) = (points.continued.get(&p), points.fields.field(p as usize));
+        let (extrapolation, field) = (points.extrapolation.get(&p), points.fields.field(p as usize));
         let nodes = support.nodes.iter().zip(&support.values).zip(&support.gradients);
         let entry = |((&index, &n), &gradient): ((_, &f64), &[f64; D])| {
             let grad_n = Vector::from(gradient);
-            let rise = continued.map_or(0.0, |by| grad_n.dot(by));
+            let rise = extrapolation.map_or(0.0, |by| grad_n.dot(by));
             (grid.id_in(field, index), n + rise, grad_n)
         };
         lists.push(nodes.map(entry).collect());

@@ -16,7 +16,7 @@ pub struct Points<'a, const D: usize> {
     /// The points on a loaded surface, by their index in memory. They take the
     /// [functions of a surface](crate::approximation::Separable::at_surface), evaluated at x and continued linearly along each axis by
     /// this vector.
-    pub continued: BTreeMap<u32, Vector<f64, D>>,
+    pub extrapolation: BTreeMap<u32, Vector<f64, D>>,
     /// The nodal fields of the particles.
     pub fields: Fields<'a>,
 }
@@ -24,7 +24,7 @@ pub struct Points<'a, const D: usize> {
 impl<'a, const D: usize> Points<'a, D> {
     /// The particles at `positions`, none of which is on a loaded surface.
     pub fn at(positions: &'a [Vector<f64, D>]) -> Self {
-        Self { positions: positions.into(), ids: None, continued: BTreeMap::new(), fields: Fields::default() }
+        Self { positions: positions.into(), ids: None, extrapolation: BTreeMap::new(), fields: Fields::default() }
     }
 
     /// The id of a particle, for messages.

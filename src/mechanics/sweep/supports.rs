@@ -42,7 +42,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// ```
 #[derive(Debug)]
 pub struct Supports<const D: usize> {
-    pub(super) way: Way<D>,
+    pub(super) implementation: Implementation<D>,
     pub(super) grid: Grid<D>,
     /// Active nodes.
     pub(super) nodes: Nodes,
@@ -58,22 +58,22 @@ pub struct Supports<const D: usize> {
 
 /// An implementation of the loop over the particles.
 #[derive(Debug)]
-pub(super) enum Way<const D: usize> {
+pub(super) enum Implementation<const D: usize> {
     Plain(Plain<D>),
     Tiled(Tiled<D>),
 }
 
-/// Calls one method of whichever [`Way`] is stored.
-macro_rules! either {
-    ($self:expr, $way:ident => $call:expr) => {
-        match &$self.way {
-            Way::Plain($way) => $call,
-            Way::Tiled($way) => $call,
+/// Calls one method of whichever [`Implementation`] is stored.
+macro_rules! dispatch {
+    ($self:expr, $one:ident => $call:expr) => {
+        match &$self.implementation {
+            Implementation::Plain($one) => $call,
+            Implementation::Tiled($one) => $call,
         }
     };
 }
 
-pub(super) use either;
+pub(super) use dispatch;
 
 impl<const D: usize> Supports<D> {
     /// Evaluates the shape functions at all positions and numbers the active nodes.
@@ -88,8 +88,8 @@ impl<const D: usize> Supports<D> {
         Self::rebuilt(None, approximation, grid, &Points::at(positions), &Pool::default())
     }
 
-    /// [`Self::new`] in the memory of `spare`, such as the supports of the last step. Sorting begins with the order of particles
-    /// in `spare`. The result does not depend on `spare`. If the points have ids, the result does not depend on the order of particles
+    /// [`Self::new`] in the memory of `reused`, such as the supports of the last step. Sorting begins with the order of particles
+    /// in `reused`. The result does not depend on `reused`. If the points have ids, the result does not depend on the order of particles
     /// in memory either, because sums run over cells and ids.
     ///
     /// ```
@@ -114,7 +114,7 @@ impl<const D: usize> Supports<D> {
     /// # Errors
     /// The errors of [`Self::new`].
     pub fn rebuilt<A: ShapeFunction>(
-        spare: Option<Self>,
+        reused: Option<Self>,
         approximation: &A,
         grid: &Grid<D>,
         points: &Points<'_, D>,
@@ -122,16 +122,22 @@ impl<const D: usize> Supports<D> {
     ) -> Result<(Self, Nodes), SupportError> {
         match approximation.separable() {
             Some(product) if product.width() <= WIDEST => {
-                let spare = spare.and_then(|spare| match spare.way {
-                    Way::Plain(_) => None,
-                    Way::Tiled(tiled) => Some(tiled),
+                let reused = reused.and_then(|reused| match reused.implementation {
+                    Implementation::Plain(_) => None,
+                    Implementation::Tiled(tiled) => Some(tiled),
                 });
-                let (tiled, nodes) = Tiled::new(approximation, product, grid, points, spare, pool)?;
-                Ok((Self::of_way(Way::Tiled(tiled), grid, &nodes, pool).with_fields(points), nodes))
+                let (tiled, nodes) = Tiled::new(approximation, product, grid, points, reused, pool)?;
+                Ok((
+                    Self::of_implementation(Implementation::Tiled(tiled), grid, &nodes, pool).with_fields(points),
+                    nodes,
+                ))
             }
             _ => {
                 let (plain, nodes) = Plain::new(approximation, grid, points)?;
-                Ok((Self::of_way(Way::Plain(plain), grid, &nodes, pool).with_fields(points), nodes))
+                Ok((
+                    Self::of_implementation(Implementation::Plain(plain), grid, &nodes, pool).with_fields(points),
+                    nodes,
+                ))
             }
         }
     }
@@ -171,12 +177,12 @@ impl<const D: usize> Supports<D> {
         positions: &[Vector<f64, D>],
     ) -> Result<(Self, Nodes), SupportError> {
         let (plain, nodes) = Plain::new(approximation, grid, &Points::at(positions))?;
-        Ok((Self::of_way(Way::Plain(plain), grid, &nodes, &Pool::default()), nodes))
+        Ok((Self::of_implementation(Implementation::Plain(plain), grid, &nodes, &Pool::default()), nodes))
     }
 
-    fn of_way(way: Way<D>, grid: &Grid<D>, nodes: &Nodes, pool: &Pool) -> Self {
+    fn of_implementation(implementation: Implementation<D>, grid: &Grid<D>, nodes: &Nodes, pool: &Pool) -> Self {
         let (nodes, passes, pool) = (nodes.clone(), AtomicU64::new(0), pool.clone());
-        Self { way, grid: *grid, nodes, fields: Vec::new(), passes, pool, extension: None }
+        Self { implementation, grid: *grid, nodes, fields: Vec::new(), passes, pool, extension: None }
     }
 
     /// These supports with an extension u = E û: outer nodes follow inner ones, and equilibria are solved for the inner nodes alone.
@@ -217,26 +223,26 @@ impl<const D: usize> Supports<D> {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn block_order(&self) -> Option<Vec<u32>> {
-        let Way::Tiled(tiled) = &self.way else { return None };
+        let Implementation::Tiled(tiled) = &self.implementation else { return None };
         (!tiled.is_memory_order).then(|| tiled.order().collect())
     }
 
     /// Renumbers the particles after they have been put into [`Self::block_order`].
     pub(crate) fn rearrange(&mut self) {
-        if let Way::Tiled(tiled) = &mut self.way {
+        if let Implementation::Tiled(tiled) = &mut self.implementation {
             tiled.rearrange();
         }
     }
 
     /// These supports with the number of passes set to zero.
-    pub(crate) fn again(self) -> Self {
+    pub(crate) fn with_no_pass(self) -> Self {
         self.passes.store(0, Ordering::Relaxed);
         self
     }
 
     /// Number of particles.
     pub fn particles(&self) -> usize {
-        either!(self, way => way.particles())
+        dispatch!(self, one => one.particles())
     }
 
     /// Number of active nodes.
@@ -281,24 +287,24 @@ impl<const D: usize> Supports<D> {
 
     /// Whether shape functions are stored by axis, as products are.
     pub fn is_tiled(&self) -> bool {
-        matches!(self.way, Way::Tiled(_))
+        matches!(self.implementation, Implementation::Tiled(_))
     }
 
     /// Calls `visit` for all groups, in the order of their numbers.
     pub(crate) fn each_group(&self, mut visit: impl FnMut(Group<'_>)) {
-        either!(self, way => way.each_group(&mut visit));
+        dispatch!(self, one => one.each_group(&mut visit));
     }
 
     /// `evaluate(group)` of all groups, in the order of their numbers.
     pub(crate) fn map_groups<R: Clone + Default + Send>(&self, evaluate: impl Fn(Group<'_>) -> R + Sync) -> Vec<R> {
         let mut results = vec![R::default(); self.groups()];
-        either!(self, way => way.map_groups(&evaluate, &mut results));
+        dispatch!(self, one => one.map_groups(&evaluate, &mut results));
         results
     }
 
     /// Number of groups.
     pub(crate) fn groups(&self) -> usize {
-        either!(self, way => way.groups())
+        dispatch!(self, one => one.groups())
     }
 
     /// The groups in vector lanes: the nodes of a group's window along each axis, and its number of particles. The list is empty where
@@ -306,9 +312,9 @@ impl<const D: usize> Supports<D> {
     ///
     /// Example: [`Self::plain`].
     pub fn windows(&self) -> Vec<([usize; 3], usize)> {
-        match &self.way {
-            Way::Plain(_) => Vec::new(),
-            Way::Tiled(tiled) => tiled.windows(),
+        match &self.implementation {
+            Implementation::Plain(_) => Vec::new(),
+            Implementation::Tiled(tiled) => tiled.windows(),
         }
     }
 
@@ -316,20 +322,20 @@ impl<const D: usize> Supports<D> {
     ///
     /// Example: [`Self::plain`].
     pub fn bytes(&self) -> usize {
-        either!(self, way => way.bytes())
+        dispatch!(self, one => one.bytes())
     }
 
     /// Bytes of the boxes into which all blocks scatter at the same time. With one thread, the blocks share a box.
     pub(crate) fn box_bytes(&self) -> usize {
-        match &self.way {
-            Way::Plain(_) => 0,
-            Way::Tiled(tiled) => tiled.box_bytes(),
+        match &self.implementation {
+            Implementation::Plain(_) => 0,
+            Implementation::Tiled(tiled) => tiled.box_bytes(),
         }
     }
 
     /// The entries (active node, N, ∇_r N) of one particle.
     pub fn of(&self, particle: usize) -> impl Iterator<Item = (usize, f64, Vector<f64, D>)> {
-        either!(self, way => way.of(&self.grid, particle)).into_iter()
+        dispatch!(self, one => one.of(&self.grid, particle)).into_iter()
     }
 
     /// Σ N_I u_I at one particle.

@@ -39,13 +39,13 @@ pub(super) struct Tiled<const D: usize> {
 }
 
 impl<const D: usize> Tiled<D> {
-    /// [`super::Supports::new`] for a shape function that is a product. The arrays and the particle order of `spare` are reused.
+    /// [`super::Supports::new`] for a shape function that is a product. The new ones lie in the memory of `reused`, and sorting begins with its order.
     pub(super) fn new<A: ShapeFunction>(
         approximation: &A,
         product: &dyn Separable,
         grid: &Grid<D>,
         points: &Points<'_, D>,
-        spare: Option<Self>,
+        reused: Option<Self>,
         pool: &Pool,
     ) -> Result<(Self, Nodes), SupportError> {
         let positions = &*points.positions;
@@ -57,7 +57,7 @@ impl<const D: usize> Tiled<D> {
             let (particle, source) = failing.min_by_key(|&(id, _)| id).unwrap_or((points.id(particle), source));
             SupportError { particle, source }
         };
-        let Self { mut blocks, mut ranges, slots, keys, .. } = spare.unwrap_or_default();
+        let Self { mut blocks, mut ranges, slots, keys, .. } = reused.unwrap_or_default();
         let keys = order::sorted(grid, points, keys).map_err(|particle| {
             let outside = ApproximationError::Outside { position: Vec::new(), lower: Vec::new(), upper: Vec::new() };
             failure(particle, outside)

@@ -291,13 +291,13 @@ impl<'a, const D: usize> Update<'a, D> {
         supports: &Supports<D>,
         dt: f64,
     ) -> Option<usize> {
-        let remembered = particles.remembered;
+        let variable_count = particles.variable_count;
         let (mut next, undefined) = (particles.memory.clone(), First::none());
-        if remembered > 0 || !particles.dilatation.is_empty() {
+        if variable_count > 0 || !particles.dilatation.is_empty() {
             let gradients = self.gradients(supports);
             let update = |p: usize, next: &mut [f64]| {
                 let law = &bodies[particles.body[p] as usize].law;
-                let memory = &particles.memory[p * remembered..(p + 1) * remembered];
+                let memory = &particles.memory[p * variable_count..(p + 1) * variable_count];
                 let h = Kinematics(particles).displacement_gradient(p, &gradients[p]);
                 let (at, det_f) = MaterialState::new(h).admissible_or_rest();
                 law.update_variables(&at.in_step(dt, memory), next);
@@ -310,12 +310,12 @@ impl<'a, const D: usize> Update<'a, D> {
             let mut left = &mut next[..];
             let part = |part: usize| {
                 let particles = part * PART..particles.len().min((part + 1) * PART);
-                Some((particles.clone(), left.split_off_mut(..particles.len() * remembered)?))
+                Some((particles.clone(), left.split_off_mut(..particles.len() * variable_count)?))
             };
             let parts = (0..particles.len().div_ceil(PART)).filter_map(part);
             parallel::for_each(parts, &|(particles, mut next): (Range<usize>, &mut [f64])| {
                 for p in particles {
-                    next.split_off_mut(..remembered).into_iter().for_each(|next| update(p, next));
+                    next.split_off_mut(..variable_count).into_iter().for_each(|next| update(p, next));
                 }
             });
         }
@@ -393,7 +393,7 @@ fn yielding<const D: usize, L: Law>(particles: &Particles<D>, bodies: &[Body<L>]
     for (p, (&body, volume)) in particles.body.iter().zip(&particles.volume).enumerate() {
         if let Some(&Some(place)) = plastic_strain.get(body as usize) {
             plastic += volume;
-            let variable = p * particles.remembered + place;
+            let variable = p * particles.variable_count + place;
             yielding += if next.get(variable) > particles.memory.get(variable) { *volume } else { 0.0 };
         }
     }

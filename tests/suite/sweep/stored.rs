@@ -58,8 +58,8 @@ fn frozen_bytes_are_those_of_the_tangent<const D: usize>(law: &Material) -> Resu
     // A, the upper triangle of B, κ and q; also b and c if the law has them; 𝔸 itself without a closed form.
     let triangle = D * (D + 1) / 2;
     let closed = law.closed(&identity(), &MaterialState::new(Tensor::<f64, D>::zeros()), 1.0).ok_or("a closed form")?;
-    let ClosedTangent { both, .. } = closed;
-    let numbers = D * D + triangle + 2 + if both.is_some() { 2 * triangle } else { 0 };
+    let ClosedTangent { factors, .. } = closed;
+    let numbers = D * D + triangle + 2 + if factors.is_some() { 2 * triangle } else { 0 };
     let (bodies, general) = ([body(law.clone())], [body(Watched::unlisted(law.clone(), false))]);
     // Eight lanes per group, full or not.
     let lanes = 8 * tiled.windows().len();
