@@ -104,16 +104,14 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     /// product. Laws from shared libraries compare their claims with differences, at a few particles.
     ///
     /// ```
-    /// use bfree::mechanics::{check::{CheckError, direction}, sweep::Supports, transfer::Nodal};
+    /// use bfree::mechanics::check::{CheckError, direction};
     ///
     /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
     /// let simulation = scene.build::<2>("scenes".as_ref())?;
-    /// let (particles, grid, dt) = (&simulation.particles, &simulation.grid, simulation.clock.step());
-    /// let (supports, nodes) = Supports::new(&simulation.approximation, grid, &particles.position)?;
-    /// let nodal = Nodal::project(particles, &supports, 1.0)?;
-    /// let equilibrium = simulation.equilibrium(&supports, &nodal, &[], simulation.settings.scheme.end(dt), dt);
-    /// let u = direction::<2>(nodes.len(), 2);
-    /// let phi: Vec<_> = direction::<2>(nodes.len(), 1).iter().map(|x| x * 0.01).collect();
+    /// let coming = simulation.next_step()?;
+    /// let (equilibrium, count) = (coming.equilibrium(), coming.nodes().len());
+    /// let u = direction::<2>(count, 2);
+    /// let phi: Vec<_> = direction::<2>(count, 1).iter().map(|x| x * 0.01).collect();
     /// equilibrium.check_tangent(&phi, &u)?;
     /// // Where a particle is turned inside out there is nothing to compare.
     /// let far: Vec<_> = phi.iter().map(|x| x * 1000.0).collect();

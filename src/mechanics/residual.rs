@@ -26,19 +26,17 @@ pub use crate::mechanics::kinematics::{Inadmissible, compose};
 /// read, and the residual there is zero.
 ///
 /// ```
-/// use bfree::mechanics::{loads::{Curve, Gravity}, schemes::Newmark, sweep::Supports, transfer::Nodal};
+/// use bfree::mechanics::loads::{Curve, Gravity};
 /// use bfree::tensor::Vector;
 ///
 /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
 /// let mut simulation = scene.build::<2>("scenes".as_ref())?;
-/// // Free fall: φ = β Δt² g gives a = α₁ φ = g, and all forces are in balance.
-/// let (newmark, dt, g) = (Newmark::default(), 0.05, Vector::from([0.0, -10.0]));
+/// // Free fall from rest with β = ¼: φ = ¼ Δt² g gives a = α₁ φ = g, and all forces are in balance.
+/// let (dt, g) = (simulation.clock.step(), Vector::from([0.0, -10.0]));
 /// simulation.loads.gravity = Some(Gravity { acceleration: g, curve: Curve::constant(1.0) });
-/// let particles = &simulation.particles;
-/// let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
-/// let nodal = Nodal::at_rest(particles, &supports);
-/// let equilibrium = simulation.equilibrium(&supports, &nodal, &[], newmark.alphas(dt), dt);
-/// let phi = vec![g * (newmark.beta * dt * dt); nodes.len()];
+/// simulation.particles.velocity.fill(Vector::zeros());
+/// let coming = simulation.next_step()?;
+/// let (equilibrium, phi) = (coming.equilibrium(), vec![g * (0.25 * dt * dt); coming.nodes().len()]);
 /// let residual = equilibrium.residual(&phi)?;
 /// let largest = residual.iter().map(|r| r.norm()).fold(0.0, f64::max);
 /// assert!(largest < 1e-14 * equilibrium.magnitude(&phi)?);
@@ -227,18 +225,16 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
     /// potential.
     ///
     /// ```
-    /// use bfree::mechanics::{check::direction, sweep::Supports, transfer::Nodal};
+    /// use bfree::mechanics::check::direction;
     /// use num_dual::Dual64;
     ///
     /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
     /// let simulation = scene.build::<2>("scenes".as_ref())?;
-    /// let (particles, grid, dt) = (&simulation.particles, &simulation.grid, simulation.clock.step());
-    /// let (supports, nodes) = Supports::new(&simulation.approximation, grid, &particles.position)?;
-    /// let nodal = Nodal::project(particles, &supports, 1.0)?;
-    /// let equilibrium = simulation.equilibrium(&supports, &nodal, &[], simulation.settings.scheme.end(dt), dt);
+    /// let coming = simulation.next_step()?;
+    /// let (equilibrium, count) = (coming.equilibrium(), coming.nodes().len());
     /// // R = ∂Π/∂φ: along any u, the derivative of Π by dual numbers is R·u.
-    /// let u = direction::<2>(nodes.len(), 2);
-    /// let phi: Vec<_> = direction::<2>(nodes.len(), 1).iter().map(|x| x * 0.01).collect();
+    /// let u = direction::<2>(count, 2);
+    /// let phi: Vec<_> = direction::<2>(count, 1).iter().map(|x| x * 0.01).collect();
     /// let seeded: Vec<_> = phi.iter().zip(&u).map(|(x, u)| x.zip_map(u, Dual64::new)).collect();
     /// let slope = equilibrium.potential(&seeded).ok_or("a follower pressure has no potential")??.0.eps;
     /// let residual = equilibrium.residual(&phi)?;

@@ -40,16 +40,14 @@ impl Display for Loose {
 /// The first group of touching bodies (bodies that share nodes) with a free and loaded rigid-body mode.
 ///
 /// ```
-/// use bfree::mechanics::{rigid::loose, sweep::Supports};
+/// use bfree::mechanics::rigid::loose;
 ///
 /// // A column that stands on the floor of its box, and the same column without the floor.
 /// let scene = bfree::scene::read_file("scenes/column_static.json".as_ref(), &[])?;
 /// let mut simulation = scene.build::<2>("scenes".as_ref())?;
 /// let found = |of: &bfree::simulation::Simulation<2>| -> Result<_, Box<dyn std::error::Error>> {
-///     let (supports, nodes) = Supports::new(&of.approximation, &of.grid, &of.particles.position)?;
-///     let (nodal, prescribed, dt) = (of.project(&supports)?, of.prescribed(&nodes), of.clock.step());
-///     let equilibrium = of.equilibrium(&supports, &nodal, &prescribed, of.settings.scheme.end(dt), dt);
-///     Ok(loose(&of.grid, &equilibrium, &nodes))
+///     let coming = of.next_step()?;
+///     Ok(loose(&of.grid, &coming.equilibrium(), coming.nodes()))
 /// };
 /// assert_eq!(found(&simulation)?, None);
 /// simulation.loads.prescribed.clear();

@@ -20,16 +20,14 @@ use num_dual::Dual64;
 /// The linearisation K(φ) as an operator.
 ///
 /// ```
-/// use bfree::mechanics::{check::direction, sweep::Supports, transfer::Nodal};
+/// use bfree::mechanics::check::direction;
 /// use bfree::tensor::Vector;
 ///
 /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
 /// let simulation = scene.build::<2>("scenes".as_ref())?;
-/// let (particles, grid, dt) = (&simulation.particles, &simulation.grid, simulation.clock.step());
-/// let (supports, nodes) = Supports::new(&simulation.approximation, grid, &particles.position)?;
-/// let nodal = Nodal::project(particles, &supports, 1.0)?;
-/// let equilibrium = simulation.equilibrium(&supports, &nodal, &[], simulation.settings.scheme.end(dt), dt);
-/// let phi: Vec<_> = direction::<2>(nodes.len(), 1).iter().map(|x| x * 0.01).collect();
+/// let coming = simulation.next_step()?;
+/// let (equilibrium, count) = (coming.equilibrium(), coming.nodes().len());
+/// let phi: Vec<_> = direction::<2>(count, 1).iter().map(|x| x * 0.01).collect();
 /// let tangent = equilibrium.tangent(&phi)?;
 /// let times = |u: &[Vector<f64, 2>]| {
 ///     let mut out = vec![Vector::zeros(); u.len()];
@@ -38,11 +36,11 @@ use num_dual::Dual64;
 /// };
 /// // All loads have a potential, so K is symmetric: w·Ku = u·Kw.
 /// let dot = |a: &[Vector<f64, 2>], b: &[Vector<f64, 2>]| a.iter().zip(b).map(|(a, b)| a.dot(b)).sum::<f64>();
-/// let (u, w) = (direction(nodes.len(), 2), direction(nodes.len(), 3));
+/// let (u, w) = (direction(count, 2), direction(count, 3));
 /// let (ku, kw) = (times(&u), times(&w));
 /// assert!((dot(&w, &ku) - dot(&u, &kw)).abs() < 1e-13 * (dot(&ku, &ku) * dot(&w, &w)).sqrt());
 /// // K_II is the force on node I under its own motion.
-/// let mut unit = vec![Vector::zeros(); nodes.len()];
+/// let mut unit = vec![Vector::zeros(); count];
 /// unit[30] = Vector::from([1.0, 0.0]);
 /// let column = tangent.diagonal_blocks()[30].column(0).into_owned();
 /// assert!((times(&unit)[30] - column).norm() < 1e-13 * column.norm());
@@ -157,19 +155,17 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     /// A piece of K u by dual numbers: the derivative of the same piece of the residual, through the same transfer loop.
     ///
     /// ```
-    /// use bfree::mechanics::{check::direction, sweep::Supports, transfer::Nodal};
+    /// use bfree::mechanics::check::direction;
     /// use bfree::tensor::Vector;
     ///
     /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
     /// let simulation = scene.build::<2>("scenes".as_ref())?;
-    /// let (particles, grid, dt) = (&simulation.particles, &simulation.grid, simulation.clock.step());
-    /// let (supports, nodes) = Supports::new(&simulation.approximation, grid, &particles.position)?;
-    /// let nodal = Nodal::project(particles, &supports, 1.0)?;
-    /// let equilibrium = simulation.equilibrium(&supports, &nodal, &[], simulation.settings.scheme.end(dt), dt);
-    /// let phi: Vec<_> = direction::<2>(nodes.len(), 1).iter().map(|x| x * 0.01).collect();
-    /// let u = direction::<2>(nodes.len(), 2);
+    /// let coming = simulation.next_step()?;
+    /// let (equilibrium, count) = (coming.equilibrium(), coming.nodes().len());
+    /// let phi: Vec<_> = direction::<2>(count, 1).iter().map(|x| x * 0.01).collect();
+    /// let u = direction::<2>(count, 2);
     /// for piece in equilibrium.terms.pieces() {
-    ///     let (mut product, dual) = (vec![Vector::zeros(); nodes.len()], equilibrium.derivative(piece, &phi, &u)?);
+    ///     let (mut product, dual) = (vec![Vector::zeros(); count], equilibrium.derivative(piece, &phi, &u)?);
     ///     equilibrium.tangent_of(piece, &phi)?.product(&u, &mut product);
     ///     let apart = product.iter().zip(&dual).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
     ///     assert!(apart < 1e-12, "{}: {apart}", piece.name);

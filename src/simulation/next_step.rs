@@ -5,6 +5,7 @@ use crate::approximation::{Approximation, ShapeFunction};
 use crate::material::{Law, Material};
 use crate::mechanics::loads::PrescribedDof;
 use crate::mechanics::residual::Equilibrium;
+use crate::mechanics::schemes::Alphas;
 use crate::mechanics::sweep::Supports;
 use crate::mechanics::transfer::Nodal;
 use crate::mechanics::unknowns::Unknowns;
@@ -32,6 +33,8 @@ pub struct NextStep<const D: usize, L = Material, A = Approximation> {
     supports: Supports<D>,
     nodal: Nodal<D>,
     prescribed: Vec<PrescribedDof>,
+    /// The coefficients of the time integrator.
+    alphas: Alphas,
 }
 
 impl<const D: usize, L: Law + Clone, A: ShapeFunction + Clone> Simulation<D, L, A> {
@@ -49,7 +52,8 @@ impl<const D: usize, L: Law + Clone, A: ShapeFunction + Clone> Simulation<D, L, 
         let prescribed = self.prescribed(supports.active());
         let nodal = simulation.nodal(&supports, &prescribed)?.with_prescribed(&prescribed);
         let nodal = nodal.extended(&Unknowns::new(&supports, &prescribed));
-        Ok(NextStep { simulation, supports, nodal, prescribed })
+        let alphas = simulation.settings.scheme.balance(simulation.clock.step());
+        Ok(NextStep { simulation, supports, nodal, prescribed, alphas })
     }
 }
 
@@ -69,6 +73,41 @@ impl<const D: usize, L: Law, A: ShapeFunction> NextStep<D, L, A> {
         &self.prescribed
     }
 
+    /// The state at the nodes, with prescribed values.
+    pub fn nodal(&self) -> &Nodal<D> {
+        &self.nodal
+    }
+
+    /// The shape functions.
+    pub fn supports(&self) -> &Supports<D> {
+        &self.supports
+    }
+
+    /// The same problem with other coefficients of the time integrator.
+    pub fn with_alphas(self, alphas: Alphas) -> Self {
+        Self { alphas, ..self }
+    }
+
+    /// The same problem with another implementation of the same shape functions, such as [`Supports::plain`].
+    pub fn with_supports(self, supports: Supports<D>) -> Self {
+        Self { supports, ..self }
+    }
+
+    /// The Δφ that Newton's method starts from.
+    pub fn initial_guess(&self) -> Vec<Vector<f64, D>> {
+        let mut dphi =
+            self.simulation.initial_guess(&self.supports, &self.nodal, self.simulation.clock.step()).to_vec();
+        self.prescribe(&mut dphi);
+        dphi
+    }
+
+    /// Writes the prescribed increments of the whole step into Δφ.
+    pub fn prescribe(&self, dphi: &mut [Vector<f64, D>]) {
+        for dof in &self.prescribed {
+            dphi[dof.node][dof.component] = dof.step.increment;
+        }
+    }
+
     /// The nodal motion φ since the last grid reset, for an increment Δφ since t_n.
     pub fn motion(&self, dphi: &[Vector<f64, D>]) -> Vec<Vector<f64, D>> {
         dphi.iter().zip(self.nodal.moved(dphi.len())).map(|(dphi, before)| dphi + before).collect()
@@ -76,10 +115,8 @@ impl<const D: usize, L: Law, A: ShapeFunction> NextStep<D, L, A> {
 
     /// The equilibrium, as a function of φ, at the instant of force balance: the end of the step, except in generalised-α.
     pub fn equilibrium(&self) -> Equilibrium<'_, D, L> {
-        let simulation = &self.simulation;
-        let alphas = simulation.settings.scheme.balance(simulation.clock.step());
-        let load = simulation.load_of_balance();
-        simulation.equilibrium(&self.supports, &self.nodal, &self.prescribed, alphas, load)
+        let Self { simulation, supports, nodal, prescribed, alphas } = self;
+        simulation.equilibrium(supports, nodal, prescribed, *alphas, simulation.load_of_balance())
     }
 
     /// The instant of force balance, as a fraction θ of the step.

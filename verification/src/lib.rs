@@ -18,7 +18,6 @@ pub mod double_double;
 pub mod known;
 #[cfg(feature = "studies")]
 pub mod manufactured;
-pub mod prepared;
 #[cfg(feature = "studies")]
 pub mod processor;
 pub mod random;

@@ -1,7 +1,6 @@
 //! The tangent of a whole step against dual numbers, piece by piece, through the products that the solver applies.
 
 use super::regime::{condition, round_off};
-use crate::prepared::Prepared;
 use crate::random::Random;
 use crate::report::{Bound, Report};
 use bfree::approximation::ShapeFunction;
@@ -30,29 +29,31 @@ const PRESSURE: &str = "follower pressure";
 /// potential exist, symmetry is checked, and the residual against the gradient of the potential. Labels are (quantity, Δφ).
 ///
 /// The Δφ are zero, Δt v_n, and a random one of a hundredth of the spacing, shortened until no particle has det F ≤ 0.
-pub fn check_tangent<const D: usize, L: Law, A: ShapeFunction>(simulation: &Simulation<D, L, A>) -> Report {
+pub fn check_tangent<const D: usize, L: Law + Clone, A: ShapeFunction + Clone>(
+    simulation: &Simulation<D, L, A>,
+) -> Report {
     let mut report = Report::new("tangent of the coming step", &["quantity", "increment"]);
-    let prepared = match Prepared::new(simulation) {
-        Ok(prepared) => prepared,
+    let coming = match simulation.next_step() {
+        Ok(coming) => coming,
         Err(error) => {
             report.push_error(&["setting up", "-"], &error);
             return report;
         }
     };
-    let equilibrium = prepared.equilibrium(simulation);
+    let equilibrium = coming.equilibrium();
     let mut random = Random::new(7);
-    let count = prepared.nodes.len();
+    let count = coming.nodes().len();
     let size = 0.01 * simulation.grid.spacing;
     let dt = simulation.clock.step();
     let mut increments = vec![
         ("zero", vec![Vector::zeros(); count]),
         ("random", random.field(count).iter().map(|x: &Vector<f64, D>| x * size).collect()),
     ];
-    if !prepared.nodal.is_static() {
-        increments.push(("dt v_n", prepared.nodal.velocity.iter().map(|v| v * dt).collect()));
+    if !coming.nodal().is_static() {
+        increments.push(("dt v_n", coming.nodal().velocity.iter().map(|v| v * dt).collect()));
     }
     for (name, mut dphi) in increments {
-        prepared.prescribe(&mut dphi);
+        coming.prescribe(&mut dphi);
         let mut halvings = 0;
         while halvings < HALVINGS && equilibrium.residual::<f64>(&dphi).is_err() {
             dphi.iter_mut().for_each(|x| *x *= 0.5);

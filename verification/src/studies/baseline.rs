@@ -1,7 +1,6 @@
 //! One linear system of the static block, with each preconditioner.
 
 use super::{Effort, Outcome, StudyError};
-use crate::prepared::Prepared;
 use crate::processor::Thread;
 use crate::report::{Bound, Report};
 use crate::shipped;
@@ -67,8 +66,8 @@ fn block(family: &str, cells: u32) -> Result<Simulation<3>, StudyError> {
 }
 
 fn solve(simulation: &Simulation<3>, by: Preconditioning) -> Result<(LinearReport, f64), StudyError> {
-    let prepared = Prepared::new(simulation)?;
-    let (equilibrium, dphi, pool) = (prepared.equilibrium(simulation), prepared.initial_guess(simulation), Pool::default());
+    let coming = simulation.next_step()?;
+    let (equilibrium, dphi, pool) = (coming.equilibrium(), coming.initial_guess(), Pool::default());
     let mut right = equilibrium.residual::<f64>(&dphi)?;
     equilibrium.clear_prescribed(&mut right);
     right.iter_mut().for_each(|r| *r = -*r);

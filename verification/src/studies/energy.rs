@@ -6,7 +6,6 @@ use super::tangent::{SPACING, YOUNG, average, cloud};
 use super::{Effort, Outcome, StudyError, short, worse};
 use crate::check::regime::Regime;
 use crate::check::tangent::measure;
-use crate::prepared::Prepared;
 use crate::random::Random;
 use crate::report::{Bound, Report};
 use bfree::approximation::{Approximation, Bspline, Linear, Lme};
@@ -68,11 +67,11 @@ fn dimension<const D: usize>(name: &str, law: &Material, report: &mut Report) ->
                 continue;
             }
             let alphas = EnergyMomentum.balance(simulation.clock.step());
-            let prepared = Prepared { alphas, ..Prepared::new(&simulation)? };
+            let coming = simulation.next_step()?.with_alphas(alphas);
             let size = regime.increment() * SPACING;
-            let mut dphi: Vec<Vector<f64, D>> = random.field(prepared.nodes.len()).iter().map(|x| x * size).collect();
-            prepared.prescribe(&mut dphi);
-            for measured in measure(&prepared.equilibrium(&simulation), &dphi, &mut random)? {
+            let mut dphi: Vec<Vector<f64, D>> = random.field(coming.nodes().len()).iter().map(|x| x * size).collect();
+            coming.prescribe(&mut dphi);
+            for measured in measure(&coming.equilibrium(), &dphi, &mut random)? {
                 let (of_stress, of_both) =
                     (["stress", "geometric", "material", "damping"], ["mean dilatation", "whole product", "diagonal blocks"]);
                 let quantity = measured.quantity.as_str();

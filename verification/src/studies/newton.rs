@@ -1,7 +1,6 @@
 //! The convergence of Newton's method on steps of the rebound, and on steps in which a disc meets and leaves a floor with friction. The study `rebound` compares with the paper's Table 3.
 
 use super::{Effort, Outcome, StudyError};
-use crate::prepared::Prepared;
 use crate::report::{Bound, Report, short};
 use crate::shipped;
 use crate::table::Table;
@@ -156,10 +155,10 @@ impl Study {
         simulation: &Simulation<2, Material>,
         effort: &Effort,
     ) -> Result<(), StudyError> {
-        let prepared = Prepared::new(simulation)?;
-        let equilibrium = prepared.equilibrium(simulation);
-        let mut start = vec![Vector::zeros(); prepared.nodes.len()];
-        prepared.prescribe(&mut start);
+        let coming = simulation.next_step()?;
+        let equilibrium = coming.equilibrium();
+        let mut start = vec![Vector::zeros(); coming.nodes().len()];
+        coming.prescribe(&mut start);
         let start: &[f64] = bytemuck::cast_slice(&start);
         let mut solution = None;
         for method in &METHODS {

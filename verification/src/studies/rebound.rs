@@ -2,7 +2,6 @@
 
 use super::{Effort, Outcome, StudyError};
 use crate::axis::Axis;
-use crate::prepared::Prepared;
 use crate::report::{Bound, Report, chain};
 use crate::sheet::{Curve, Mark, Panel, Sheet};
 use crate::shipped;
@@ -188,8 +187,8 @@ fn configurations() -> Result<Sheet, StudyError> {
         while simulation.clock.time() < time - 1e-9 {
             simulation.advance()?;
         }
-        let prepared = Prepared::new(&simulation)?;
-        let nodes = prepared.nodes.positions(&simulation.grid).map(|(_, x)| (x[0], x[1])).collect();
+        let coming = simulation.next_step()?;
+        let nodes = coming.positions().map(|x| (x[0], x[1])).collect();
         let particles = simulation.particles.position.iter().map(|x| (x[0], x[1])).collect();
         panels.push(Panel {
             title: format!("t = {time}"),

@@ -4,7 +4,6 @@
 use super::{Effort, Outcome, StudyError, short};
 use crate::check::regime::Regime;
 use crate::check::tangent::{POTENTIAL, PRESSURE_ASYMMETRY, SYMMETRY, measure};
-use crate::prepared::Prepared;
 use crate::random::Random;
 use crate::report::{Bound, Report};
 use bfree::approximation::Approximation;
@@ -120,17 +119,17 @@ fn dimension<const D: usize, L: Law + Clone>(
                 if averaged && !average(&mut simulation, &mut random) {
                     continue;
                 }
-                let mut ways = vec![(shape.to_owned(), Prepared::new(&simulation)?)];
-                if ways[0].1.supports.is_tiled() {
+                let mut ways = vec![(shape.to_owned(), simulation.next_step()?)];
+                if ways[0].1.supports().is_tiled() {
                     let (plain, _) = Supports::plain(&approximation, &simulation.grid, &simulation.particles.position)?;
-                    ways.push((format!("{shape}, plain"), Prepared { supports: plain, ..Prepared::new(&simulation)? }));
+                    ways.push((format!("{shape}, plain"), simulation.next_step()?.with_supports(plain)));
                 }
-                for (way, prepared) in &ways {
-                    let equilibrium = prepared.equilibrium(&simulation);
+                for (way, coming) in &ways {
+                    let equilibrium = coming.equilibrium();
                     let size = regime.increment() * SPACING;
                     let mut dphi: Vec<Vector<f64, D>> =
-                        random.field(prepared.nodes.len()).iter().map(|x| x * size).collect();
-                    prepared.prescribe(&mut dphi);
+                        random.field(coming.nodes().len()).iter().map(|x| x * size).collect();
+                    coming.prescribe(&mut dphi);
                     for measured in measure(&equilibrium, &dphi, &mut random)? {
                         // The other quantities do not depend on the pressure or the mean dilatation, so they are not listed twice.
                         let of_all = |name: &&str| measured.quantity.starts_with(name);

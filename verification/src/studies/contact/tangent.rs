@@ -3,7 +3,6 @@
 
 use crate::check::regime::Regime;
 use crate::check::tangent::measure;
-use crate::prepared::Prepared;
 use crate::random::Random;
 use crate::report::Report;
 use crate::studies::StudyError;
@@ -85,12 +84,12 @@ fn push<const D: usize>(
     slip: f64,
     random: &mut Random,
 ) -> Result<(), StudyError> {
-    let prepared = Prepared::new(simulation)?;
+    let coming = simulation.next_step()?;
     let size = if slip < 0.1 { 1e-4 } else { 1e-2 };
     let mut dphi: Vec<Vector<f64, D>> =
-        random.field(prepared.nodes.len()).iter().map(|x| x * (size * SPACING)).collect();
-    prepared.prescribe(&mut dphi);
-    let equilibrium = prepared.equilibrium(simulation);
+        random.field(coming.nodes().len()).iter().map(|x| x * (size * SPACING)).collect();
+    coming.prescribe(&mut dphi);
+    let equilibrium = coming.equilibrium();
     for measured in measure(&equilibrium, &dphi, random)? {
         let of_contact = ["contact", "whole product", "diagonal blocks"];
         if of_contact.contains(&measured.quantity.as_str()) {

@@ -3,7 +3,6 @@
 
 use super::bodies::{self, stir};
 use super::{Outcome, StudyError, rows, solvable};
-use crate::prepared::Prepared;
 use crate::report::short;
 use crate::table::Table;
 use bfree::approximation::{Approximation, Bspline, Linear, Lme};
@@ -66,9 +65,9 @@ fn square(shape: &Approximation, lumping: f64, overlap: f64) -> Simulation<2> {
 /// The first linear system of a step.
 fn solve(shape: &Approximation, lumping: f64, overlap: f64) -> Result<f64, StudyError> {
     let simulation = square(shape, lumping, overlap);
-    let prepared = Prepared::new(&simulation)?;
-    let equilibrium = prepared.equilibrium(&simulation);
-    let dphi = vec![0.0; 2 * prepared.nodes.len()];
+    let coming = simulation.next_step()?;
+    let equilibrium = coming.equilibrium();
+    let dphi = vec![0.0; 2 * coming.nodes().len()];
     let mut right = dphi.clone();
     NonlinearProblem::residual(&equilibrium, &dphi, &mut right)?;
     let tangent = equilibrium.tangent(bytemuck::cast_slice(&dphi))?;
