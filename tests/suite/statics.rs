@@ -113,9 +113,9 @@ fn what_nothing_holds_is_said() -> Result<(), Failure> {
         assert!(text.contains(words) && text.contains("boundary condition"), "{text}");
         assert_eq!(simulation.particles, before);
     }
-    // A body on a hinge below a corner.
+    // A body on a hinge below a corner. With more iterations Newton's method may find it where it hangs below the hinge, outside of the grid.
     let hinge = r#"prescribed=[{"region":{"box":{"min":[-0.01,-0.01],"max":[0.01,0.01]}},"displacement":[[0,[0,0]]]}]"#;
-    let mut simulation = scene::<2>(COLUMN, &[FREE, hinge])?;
+    let mut simulation = scene::<2>(COLUMN, &[FREE, hinge, "solver.newton.max_iterations=3"])?;
     let error = simulation.advance().expect_err("it would turn");
     assert!(causes::on_one_line(&error).contains("nothing keeps \"column\" from turning"), "{error:?}");
     Ok(())

@@ -4,6 +4,7 @@ use super::block::Block;
 use crate::grid::{Grid, TILE, tile_edge};
 use crate::nodes::{Nodes, bits};
 use crate::parallel;
+use std::ops::Range;
 
 /// The part of a row of a box, along x, that lies in one tile of nodes.
 struct Part {
@@ -17,48 +18,53 @@ struct Part {
 }
 
 /// The parts of all rows of a box, tile by tile.
-fn parts<const D: usize>(grid: &Grid<D>, block: &Block) -> Vec<Part> {
+fn parts<const D: usize>(grid: &Grid<D>, block: &Block) -> impl Iterator<Item = Part> {
     let (edge, low) = (tile_edge(D) as usize, block.origin.map(|k| k as usize));
     let high: [usize; 3] = std::array::from_fn(|k| low[k] + block.size[k]);
-    let tiles = |k: usize| low[k] / edge..high[k].div_ceil(edge);
-    let within = |k: usize, tile: usize| low[k].max(tile * edge)..high[k].min((tile + 1) * edge);
-    let mut parts = Vec::new();
-    for tile in tiles(2).flat_map(|z| tiles(1).flat_map(move |y| tiles(0).map(move |x| [x, y, z]))) {
-        let x = within(0, tile[0]);
-        for (z, y) in within(2, tile[2]).flat_map(|z| within(1, tile[1]).map(move |y| (z, y))) {
-            let row = (z - low[2]) * block.size[1] + y - low[1];
-            let in_tile = u64::MAX >> (u64::BITS as usize - x.len());
-            let active = block.active[row] >> (x.start - low[0]) & in_tile;
-            if active != 0 {
-                let at = [x.start, y, z];
-                let id = grid.id_in(block.field, std::array::from_fn(|k| at[k] as u32));
-                let place = row * block.size[0] + x.start - low[0];
-                parts.push(Part { tile: id / TILE, node: id % TILE, place, active });
-            }
+    let tiles = move |k: usize| low[k] / edge..high[k].div_ceil(edge);
+    let within = move |k: usize, tile: usize| low[k].max(tile * edge)..high[k].min((tile + 1) * edge);
+    let rows = move |[tx, ty, tz]: [usize; 3]| {
+        within(2, tz).flat_map(move |z| within(1, ty).map(move |y| (within(0, tx), y, z)))
+    };
+    let part = move |(x, y, z): (Range<usize>, usize, usize)| {
+        let row = (z - low[2]) * block.size[1] + y - low[1];
+        let active = block.active[row] >> (x.start - low[0]) & (u64::MAX >> (u64::BITS as usize - x.len()));
+        let at = [x.start, y, z];
+        let id = grid.id_in(block.field, std::array::from_fn(|k| at[k] as u32));
+        let place = row * block.size[0] + x.start - low[0];
+        (active != 0).then_some(Part { tile: id / TILE, node: id % TILE, place, active })
+    };
+    let tiles = tiles(2).flat_map(move |z| tiles(1).flat_map(move |y| tiles(0).map(move |x| [x, y, z])));
+    tiles.flat_map(rows).filter_map(part)
+}
+
+/// The tiles of a block, each with bits for its active nodes.
+fn tiles<const D: usize>(grid: &Grid<D>, block: &Block) -> Vec<(u64, u64)> {
+    let mut tiles: Vec<(u64, u64)> = Vec::new();
+    for Part { tile, node, active, .. } in parts(grid, block) {
+        match tiles.last_mut() {
+            Some((last, all)) if *last == tile => *all |= active << node,
+            _ => tiles.push((tile, active << node)),
         }
     }
-    parts
+    tiles
 }
 
 /// Numbers the active nodes in the order of the grid, and tells each block the numbers in its box.
 pub(super) fn number<const D: usize>(grid: &Grid<D>, blocks: &mut [Block]) -> Nodes {
-    let tiles = parallel::map(blocks.len(), &|b| {
-        let parts = parts(grid, &blocks[b]);
-        let tile = |same: &[Part]| (same[0].tile, same.iter().fold(0, |all, part| all | part.active << part.node));
-        parts.chunk_by(|one, next| one.tile == next.tile).map(tile).collect::<Vec<_>>()
-    });
-    let nodes = Nodes::of_tiles(tiles.concat());
+    let nodes = Nodes::of_tiles(parallel::map(blocks.len(), &|b| tiles(grid, &blocks[b])).concat());
     parallel::for_each(blocks.iter_mut(), &|block: &mut Block| {
-        let parts = parts(grid, block);
-        block.nodes.clear();
-        block.places.clear();
-        for same in parts.chunk_by(|one, next| one.tile == next.tile) {
-            let number = nodes.numbers_in(same[0].tile);
-            for Part { node, place, active, .. } in same {
-                block.nodes.extend(bits(*active).map(|k| number(node + k)));
-                block.places.extend(bits(*active).map(|k| (place + k as usize) as u32));
+        let (mut numbers, mut places) = (std::mem::take(&mut block.nodes), std::mem::take(&mut block.places));
+        numbers.clear();
+        places.clear();
+        for Part { tile, node, place, active } in parts(grid, block) {
+            let number = nodes.numbers_in(tile);
+            for k in bits(active) {
+                numbers.push(number(node + k));
+                places.push((place + k as usize) as u32);
             }
         }
+        (block.nodes, block.places) = (numbers, places);
     });
     nodes
 }
