@@ -2,7 +2,8 @@
 //!
 //! - The finest level is the tangent itself, known by its product.
 //! - Each coarser level has hat functions on a grid of twice the spacing, and is stored as stencils. Every finer cell is one quadrature
-//!   point of it, with the cell's summed volume and tangent at its centroid. Outer nodes follow inner ones, as on the finest level.
+//!   point of it, with the cell's summed volume and tangent at its centroid; in coarse cells that are not full, it has the points of Gauss.
+//!   Outer nodes follow inner ones, as on the finest level.
 //! - Coarse motions are interpolated linearly to finer nodes. Finer forces are restricted by the transpose.
 //! - Chebyshev polynomials over block-Jacobi smooth before and after the coarse correction. Both smoothers are equal, so the cycle is
 //!   symmetric where the tangent is.
