@@ -7,7 +7,7 @@
 mod laws;
 
 use laws::planted::right;
-use laws::right::{Right, Softening, Written, laws};
+use laws::right::{Fibres, Right, Softening, Written, laws};
 use laws::shipped::{Flow, Formula};
 use tangent_check::convention::{Convention, Measure};
 use tangent_check::finding::{Reason, Report, Verdict};
@@ -121,6 +121,18 @@ fn inexact_tangents_are_told_with_their_cause() {
     }
     println!("{causes} of {inexact} causes are named");
     assert!(causes as f64 >= 0.95 * inexact as f64);
+}
+
+/// At these seeds, quotients reach from slack fibres just beyond the onset of tension, so that they ask for many digits of h.
+#[test]
+fn forward_differences_beyond_a_kink_are_told() {
+    for seed in [12, 66] {
+        let report = report(&Fibres, Written::Forward(1e-4), seed);
+        assert_eq!(report.verdict(), Verdict::Inexact);
+        let mut inexact = report.findings.iter().filter(|finding| finding.verdict == Verdict::Inexact);
+        let near = |reason: &Reason| matches!(reason, Reason::ForwardDifference(h) if (h / 1e-4 - 1.0).abs() < 0.05);
+        assert!(inexact.all(|finding| finding.reason.as_ref().is_some_and(near)));
+    }
 }
 
 /// Damage that begins at stretches from 1.01 to 5: the paths reach it, and the report tells how far.

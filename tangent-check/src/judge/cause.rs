@@ -15,6 +15,9 @@ const REMAINS: f64 = 0.05;
 /// A forward difference needs so many entries that bend, because one entry fits any h.
 const ENTRIES: usize = 4;
 
+/// The h of one law differ from state to state by less than this part, which round-off makes where h is small.
+const SPREAD: f64 = 0.3;
+
 /// Round-off of a quotient (f(h) − f(0))/h, in units of the noise of f over h.
 const ROUND_OFF: f64 = 8.0;
 
@@ -71,17 +74,26 @@ impl Suspect<'_> {
         let noise = self.finding.noise.max(f64::EPSILON) * greatest(self.value);
         let round_off = ROUND_OFF * noise / h.abs();
         let allowed = (REMAINS * greatest(&deviation)).max(round_off);
-        // Beyond a kink, a quotient asks for more digits of h than other states give.
-        let mut h = h;
+        if self.leaves(h, allowed) {
+            return true;
+        }
+        let own = self.sharpened(h).filter(|own| (own / h - 1.0).abs() < SPREAD);
+        own.is_some_and(|h| self.leaves(h, allowed))
+    }
+
+    /// Whether the quotient with this h leaves no more than `allowed` of the claimed tangent.
+    fn leaves(&mut self, h: f64, allowed: f64) -> bool {
+        self.rest(h).is_some_and(|rest| greatest(&rest) <= allowed)
+    }
+
+    /// The h near this one with which the quotient is the claimed tangent, as sharply as this state shows it.
+    pub fn sharpened(&mut self, mut h: f64) -> Option<f64> {
         for _ in 0..4 {
-            let [Some(rest), Some(next)] = [self.rest(h), self.rest(1.01 * h)] else { return false };
-            if greatest(&rest) <= allowed {
-                return true;
-            }
+            let [rest, next] = [self.rest(h)?, self.rest(1.01 * h)?];
             let change: Vec<f64> = rest.iter().zip(&next).map(|(rest, next)| (next - rest) / (0.01 * h)).collect();
             h -= along(&rest, &change);
         }
-        false
+        h.is_finite().then_some(h)
     }
 
     /// claimed_k − (f(k, h) − f(0))/h.

@@ -44,12 +44,14 @@ impl Causes<'_> {
         }
         let sample = inexact.iter().step_by(inexact.len().div_ceil(SAMPLE));
         let size = sample.len();
-        let mut steps: Vec<f64> = sample.filter_map(|index| self.step(*index, &mut findings[*index])).collect();
-        steps.sort_by(f64::total_cmp);
-        let middle = steps.get(steps.len() / 2).copied().unwrap_or(0.0);
+        let steps: Vec<f64> = sample.filter_map(|index| self.step(*index, &mut findings[*index])).collect();
+        let middle = median(steps.clone()).unwrap_or(0.0);
         let same = steps.iter().filter(|h| (1.0 / SAME..SAME).contains(&(*h / middle))).count();
         let enough = same as f64 >= SHOWN * size as f64 && same >= size.min(3);
-        let forward = (enough && same as f64 >= AGREE * steps.len() as f64).then_some(middle);
+        let mut forward = (enough && same as f64 >= AGREE * steps.len() as f64).then_some(middle);
+        if inexact.iter().any(|index| findings[*index].verdict == Verdict::Wrong) {
+            forward = forward.map(|h| self.sharpened(findings, h));
+        }
         let cause = match forward {
             Some(h) => Reason::ForwardDifference(h),
             None => self.other(findings, &inexact),
@@ -74,6 +76,15 @@ impl Causes<'_> {
         h.inspect(|h| (finding.verdict, finding.reason) = (Verdict::Inexact, Some(Reason::ForwardDifference(*h))))
     }
 
+    /// The h of the states that show one, to all digits: a quotient that reaches just beyond a kink asks for more than the smooth states need.
+    fn sharpened(&mut self, findings: &[Finding], h: f64) -> f64 {
+        let shows = |index: &usize| matches!(findings[*index].reason, Some(Reason::ForwardDifference(_)));
+        let shown = (0..findings.len()).filter(shows).take(TRIED);
+        let sharpened =
+            shown.filter_map(|index| self.suspect(index, &findings[index], |suspect| suspect.sharpened(h)).flatten());
+        median(sharpened.collect()).unwrap_or(h)
+    }
+
     fn is_step(&mut self, index: usize, finding: &Finding, h: f64) -> bool {
         self.suspect(index, finding, |suspect| suspect.is_step(h)) == Some(true)
     }
@@ -92,10 +103,9 @@ impl Causes<'_> {
             inexact.iter().filter(|index| findings[**index].reason.as_ref().is_some_and(cause)).count() as f64
         };
         let tried = inexact.iter().step_by(inexact.len().div_ceil(TRIED)).copied();
-        let mut erratic: Vec<f64> = tried.filter_map(|index| self.erratic(index, &findings[index])).collect();
-        erratic.sort_by(f64::total_cmp);
-        if erratic.get(erratic.len() / 2).is_some_and(|h| *h > 0.0) {
-            return Reason::ForwardDifference(erratic[erratic.len() / 2]);
+        let erratic = median(tried.filter_map(|index| self.erratic(index, &findings[index])).collect());
+        if let Some(h) = erratic.filter(|h| *h > 0.0) {
+            return Reason::ForwardDifference(h);
         }
         let sizes = inexact.iter().filter_map(|index| match findings[*index].reason {
             Some(Reason::LocalIteration(size)) => Some(size),
@@ -132,4 +142,9 @@ impl Causes<'_> {
 fn unnamed(finding: &Finding) -> bool {
     let judged = matches!(finding.verdict, Verdict::Wrong | Verdict::Inexact);
     judged && finding.reason != Some(Reason::RoundOff)
+}
+
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
 }
