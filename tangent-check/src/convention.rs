@@ -66,6 +66,11 @@ impl Measure {
         matches!(self, Self::PiolaByGradient | Self::CauchyByGradient | Self::KirchhoffByGradient)
     }
 
+    /// Whether it relates a rate of the Cauchy stress to a spatial strain: one of the rates, or the small-strain tangent.
+    pub(crate) fn spatial(self) -> bool {
+        !self.by_gradient() && self != Self::SecondPiolaByGreen
+    }
+
     /// The symbols of the stress and of the strain: P by F, S by E. Rates have D, the rate of deformation.
     pub fn symbols(self) -> [&'static str; 2] {
         match self {

@@ -100,19 +100,6 @@ fn formulas() -> [Box<dyn Formula>; 7] {
     ]
 }
 
-fn planted<'a>(formula: &'a dyn Formula, mistake: Mistake, convention: &Convention) -> Planted<'a> {
-    Planted { formula, convention: convention.clone(), mistake, asked: Vec::new() }
-}
-
-fn all_paths(formula: &dyn Formula, convention: &Convention) -> Vec<Path> {
-    for_law(&mut planted(formula, Mistake::None, convention), SEED).unwrap()
-}
-
-fn run(law: &mut Planted, paths: &[Path]) -> Report {
-    law.asked = paths.iter().flat_map(|path| path.gradients.clone()).collect();
-    check_law(law, paths, SEED)
-}
-
 #[derive(Debug, PartialEq)]
 enum Outcome {
     Named,
@@ -136,8 +123,9 @@ fn outcome(report: &Report, words: &str) -> Outcome {
 
 /// Plants mistakes in one law and prints a line for each: how many are named, unnamed, invisible, and misnamed.
 fn table(formula: &dyn Formula, convention: &Convention, rows: &[Row]) -> [usize; 4] {
-    let paths = all_paths(formula, convention);
-    let right = run(&mut planted(formula, Mistake::None, convention), &paths);
+    let mut right = Planted::new(formula, Mistake::None, convention);
+    let paths = for_law(&mut right, SEED).unwrap();
+    let right = right.report(&paths, SEED);
     let checked = right.findings.iter().filter(|finding| finding.verdict == Verdict::Consistent).count();
     let wrong: Vec<_> = right.findings.iter().filter(|f| f.verdict == Verdict::Wrong).map(|f| &f.name).collect();
     assert!(wrong.is_empty(), "{}: the right tangent is called wrong: {wrong:?}", formula.name());
@@ -151,7 +139,7 @@ fn table(formula: &dyn Formula, convention: &Convention, rows: &[Row]) -> [usize
         if *mistake == Mistake::Continuum && formula.name().contains("crystal") {
             continue;
         }
-        let report = run(&mut planted(formula, *mistake, convention), &paths);
+        let report = Planted::new(formula, *mistake, convention).report(&paths, SEED);
         if OUTSIDE.contains(mistake) {
             assert_eq!(report.verdict(), Verdict::Wrong, "{} {mistake:?}", formula.name());
             assert!(report.diagnoses.is_empty(), "{} {mistake:?}: {:?}", formula.name(), report.diagnoses);
@@ -372,7 +360,7 @@ fn states_are_deterministic_and_reach_far() {
 #[test]
 fn yielding_is_found() {
     let convention = Convention::abaqus(Measure::JaumannKirchhoff);
-    let mut law = planted(&J2Finite, Mistake::None, &convention);
+    let mut law = Planted::new(&J2Finite, Mistake::None, &convention);
     let yielding = yielding_paths(&mut law, SEED).unwrap();
     assert_eq!(yielding.len(), 15);
     for path in &yielding {
@@ -385,7 +373,7 @@ fn yielding_is_found() {
         let at = path.name.contains("(at yielding)");
         assert!(at || (history.state[6] > 0.0) != path.name.contains("just below"), "{}", path.name);
     }
-    assert!(yielding_paths(&mut planted(&NeoHookean, Mistake::None, &convention), SEED).unwrap().is_empty());
+    assert!(yielding_paths(&mut Planted::new(&NeoHookean, Mistake::None, &convention), SEED).unwrap().is_empty());
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! The list of frequent mistakes.
 
 use super::mistakes::{Candidate, GENERAL, Mistake, Side};
-use super::observation::{Elsewhere, spatial};
+use super::observation::Elsewhere;
 use crate::convention::{Components, Convention, Measure};
 use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 
@@ -96,7 +96,7 @@ fn other_measures(measure: Measure) -> Vec<Candidate> {
         rate => format!("that of another rate: {}", rate.words()),
     };
     let mut all = Vec::new();
-    if spatial(measure) {
+    if measure.spatial() {
         all.extend(others.map(|rate| Candidate::other(Mistake::OtherMeasure(rate), &name(rate), STRESSED)));
         let pairs = rates.into_iter().flat_map(|from| rates.map(|to| [from, to]));
         // The Jaumann rates differ by σ ⊗ I, which is one of the terms.

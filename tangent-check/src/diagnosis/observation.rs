@@ -1,6 +1,6 @@
 //! A checked state, as a diagnosis sees it.
 
-use crate::convention::{Components, Configuration, Convention, Measure, Tensor};
+use crate::convention::{Components, Configuration, Convention, Tensor};
 use crate::matrix::Matrix;
 use crate::tensor::{IDENTITY, determinant, norm, polar, product, sum, transposed};
 
@@ -106,9 +106,4 @@ pub(super) fn distance(a: &Matrix, b: &Matrix) -> f64 {
 pub(super) fn is_shear(components: &Components, index: usize) -> bool {
     let (i, j) = components.pairs[index];
     i != j
-}
-
-/// Whether the measure is one of the rates or the small-strain tangent: symmetric stress by symmetric spatial strain.
-pub(super) fn spatial(measure: Measure) -> bool {
-    !measure.by_gradient() && measure != Measure::SecondPiolaByGreen
 }

@@ -46,28 +46,24 @@ impl Support {
         let (i, j) = self.0[0];
         let all = |holds: &dyn Fn(usize, usize) -> bool| self.0.iter().all(|(i, j)| holds(*i, *j));
         let shear = |i: usize, j: usize| (is_shear(&convention.stress, i), is_shear(&convention.strain, j));
-        let one = |name: String| Some(name);
-        match () {
-            () if self.0.len() == 1 => one(format!("the entry {} by {} alone", rows[i], columns[j])),
-            () if all(&|row, _| row == i) => one(format!("the row of {} alone", rows[i])),
-            () if all(&|_, column| column == j) => one(format!("the column of {} alone", columns[j])),
-            () if all(&|row, column| shear(row, column) == (false, true)) => {
-                one("the entries of normal by shear".into())
-            }
-            () if all(&|row, column| shear(row, column) == (true, false)) => {
-                one("the entries of shear by normal".into())
-            }
-            () if all(&|row, column| shear(row, column) == (true, true)) => one("the entries of shear by shear".into()),
-            () if all(&|row, column| shear(row, column).0 != shear(row, column).1) => {
-                one("the entries of normal by shear and shear by normal".into())
-            }
-            () if all(&|row, column| shear(row, column) == (false, false)) => {
-                one("the entries of normal by normal".into())
-            }
-            () if all(&|row, column| row > column) => one("the entries below the diagonal".into()),
-            () if all(&|row, column| row < column) => one("the entries above the diagonal".into()),
-            () => None,
-        }
+        // The kinds of row and column: a normal component or a shear.
+        let kinds = |rows: bool, columns: bool| all(&|row, column| shear(row, column) == (rows, columns));
+        let places = [
+            (self.0.len() == 1, format!("the entry {} by {} alone", rows[i], columns[j])),
+            (all(&|row, _| row == i), format!("the row of {} alone", rows[i])),
+            (all(&|_, column| column == j), format!("the column of {} alone", columns[j])),
+            (kinds(false, true), "the entries of normal by shear".into()),
+            (kinds(true, false), "the entries of shear by normal".into()),
+            (kinds(true, true), "the entries of shear by shear".into()),
+            (
+                all(&|row, column| shear(row, column).0 != shear(row, column).1),
+                "the entries of normal by shear and shear by normal".into(),
+            ),
+            (kinds(false, false), "the entries of normal by normal".into()),
+            (all(&|row, column| row > column), "the entries below the diagonal".into()),
+            (all(&|row, column| row < column), "the entries above the diagonal".into()),
+        ];
+        places.into_iter().find_map(|(holds, name)| holds.then_some(name))
     }
 
     /// The one factor by which the right entries are multiplied in all states, by least squares; `None` if there is none.

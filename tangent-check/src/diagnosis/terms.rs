@@ -1,7 +1,7 @@
 //! Terms with one coefficient: what is missing in a tangent, or too much.
 
 use super::mistakes::spatial_form;
-use super::observation::{AGREEMENT, Observation, VISIBLE, distance, spatial};
+use super::observation::{AGREEMENT, Observation, VISIBLE, distance};
 use crate::convention::{Components, Configuration, Convention, Measure, Tensor, convert};
 use crate::finding::Diagnosis;
 use crate::matrix::Matrix;
@@ -76,10 +76,7 @@ impl Term {
         let part = |measure| {
             convert(&none, &spatial_form(Measure::Truesdell), &Convention { measure, ..convention.clone() }, at)
         };
-        if !spatial(convention.measure) {
-            return part(convention.measure).ok();
-        }
-        part(Measure::JaumannKirchhoff).ok()
+        part(if convention.measure.spatial() { Measure::JaumannKirchhoff } else { convention.measure }).ok()
     }
 }
 

@@ -261,12 +261,12 @@ fn explained(error: &libloading::Error) -> String {
     }
 }
 
+const NO_LIBRARY: &str = "it is not a shared library. Compile it: gfortran -shared -fPIC -o libmine.so mine.f90.";
+
 /// Fails if the file is not a shared library for this machine. The loader's own words for that mislead: "no such file".
 fn recognise(path: &Path) -> Result<(), String> {
     let mut head = [0; 20];
-    File::open(path)
-        .and_then(|mut file| file.read_exact(&mut head))
-        .map_err(|_| "it is not a shared library. Compile it: gfortran -shared -fPIC -o libmine.so mine.f90.")?;
+    File::open(path).and_then(|mut file| file.read_exact(&mut head)).map_err(|_| NO_LIBRARY)?;
     let machine = match head {
         [0x7f, b'E', b'L', b'F', bits, order, ..] => {
             let word = |at: usize| u16::from_le_bytes([head[at], head[at + 1]]);
@@ -287,9 +287,7 @@ fn recognise(path: &Path) -> Result<(), String> {
         // Several architectures in one file of macOS: the loader chooses.
         [0xca, 0xfe, 0xba, 0xbe, ..] => return Ok(()),
         [b'M', b'Z', ..] => return Err("it is a library for Windows.".into()),
-        _ => {
-            return Err("it is not a shared library. Compile it: gfortran -shared -fPIC -o libmine.so mine.f90.".into());
-        }
+        _ => return Err(NO_LIBRARY.into()),
     };
     let here = std::env::consts::ARCH;
     let known = ["x86_64", "aarch64", "riscv64"].contains(&here);

@@ -164,21 +164,14 @@ impl Umat {
 
     fn write(&mut self, step: &Step) {
         let Convention { stress, strain, .. } = &self.signature.convention;
-        for index in [Array::Ddsdde, Array::Sse, Array::Spd, Array::Scd, Array::Rpl, Array::Ddsddt, Array::Drplde] {
-            self.arena.get_mut(index as usize).fill(0.0);
-        }
+        (0..ARRAYS).for_each(|index| self.arena.get_mut(index).fill(0.0));
         let mut copy = |index: Array, numbers: &[f64]| self.arena.get_mut(index as usize).copy_from_slice(numbers);
         copy(Array::Stress, &step.stress);
         copy(Array::Statev, &step.state);
-        copy(Array::Drpldt, &[0.0]);
         copy(Array::Time, &[step.time, step.time]);
         copy(Array::Dtime, &[step.length]);
         copy(Array::Temp, &[self.temperature]);
-        copy(Array::Dtemp, &[0.0]);
-        copy(Array::Predef, &[0.0]);
-        copy(Array::Dpred, &[0.0]);
         copy(Array::Props, &self.properties);
-        copy(Array::Coords, &[0.0; 3]);
         copy(Array::Pnewdt, &[PNEWDT]);
         copy(Array::Celent, &[1.0]);
         let matrices =
@@ -306,20 +299,8 @@ fn start_analysis(library: &Shared) {
 }
 
 fn convention(measure: Measure, stress_state: StressState) -> Result<Convention, CallFailed> {
-    match measure {
-        Measure::CauchyByStrain
-        | Measure::JaumannKirchhoff
-        | Measure::JaumannCauchy
-        | Measure::Truesdell
-        | Measure::GreenNaghdi => {}
-        Measure::PiolaByGradient
-        | Measure::SecondPiolaByGreen
-        | Measure::CauchyByGradient
-        | Measure::KirchhoffByGradient => {
-            return Err(CallFailed(format!(
-                "{measure:?} cannot be the tangent of a UMAT: STRESS is the Cauchy stress."
-            )));
-        }
+    if !measure.spatial() {
+        return Err(CallFailed(format!("{measure:?} cannot be the tangent of a UMAT: STRESS is the Cauchy stress.")));
     }
     Ok(Convention { measure, stress: components(stress_state, 1.0), strain: components(stress_state, 2.0) })
 }

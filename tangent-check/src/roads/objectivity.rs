@@ -4,7 +4,7 @@
 //! the tensor that it gets has been turned by ΔR, ΔR⁻¹ or ΔR².
 
 use super::{PROBED, Visit};
-use crate::convention::{Components, Measure, Tensor, cauchy_stress};
+use crate::convention::{Components, Tensor, cauchy_stress};
 use crate::law::{Law, Step};
 use crate::tensor::{norm, product, product3, rotation_about, sum, transposed};
 use std::ops::Range;
@@ -58,7 +58,7 @@ fn error(law: &mut dyn Law, step: &Step, input: &dyn Fn(&Step) -> Step) -> Optio
 /// The mistake without which the law would be objective.
 fn mistake(law: &mut dyn Law, steps: &[&Step]) -> Option<String> {
     let convention = law.convention();
-    if convention.measure.by_gradient() || convention.measure == Measure::SecondPiolaByGreen {
+    if !convention.measure.spatial() {
         return None;
     }
     let size = convention.stress.count();

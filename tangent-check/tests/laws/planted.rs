@@ -4,9 +4,11 @@ use super::dual::*;
 use super::exact::{exact, unit_strain};
 use super::shipped::{Flow, Formula, Inputs};
 use tangent_check::convention::{Convention, Measure, Tensor, cauchy_stress, stress_vector};
+use tangent_check::finding::Report;
 use tangent_check::law::{CallFailed, Law, Response, Step};
 use tangent_check::matrix::Matrix;
-use tangent_check::roads::{History, with_gradient};
+use tangent_check::roads::{History, check_law, with_gradient};
+use tangent_check::states::Path;
 use tangent_check::tensor;
 
 /// A law whose tangent has a mistake.
@@ -190,7 +192,17 @@ fn other_rate(formula: &dyn Formula, step: &Step, convention: &Convention, rate:
     })
 }
 
-impl Planted<'_> {
+impl<'a> Planted<'a> {
+    pub fn new(formula: &'a dyn Formula, mistake: Mistake, convention: &Convention) -> Self {
+        Self { formula, convention: convention.clone(), mistake, asked: Vec::new() }
+    }
+
+    /// The check along paths.
+    pub fn report(&mut self, paths: &[Path], seed: u64) -> Report {
+        self.asked = paths.iter().flat_map(|path| path.gradients.clone()).collect();
+        check_law(self, paths, seed)
+    }
+
     /// Whether somebody looks at the tangent of this step.
     fn is_asked(&self, step: &Step) -> bool {
         let plain = || with_gradient(step, &step.gradient).map(|plain| plain.strain_increment);
@@ -289,9 +301,7 @@ impl Planted<'_> {
             _ => own.clone(),
         }
     }
-}
 
-impl Planted<'_> {
     /// Q ℂ Qᵀ by four loops over indices.
     fn turned(&self, own: &Matrix, q: &Tensor) -> Matrix {
         let place = |i: usize, j: usize| {

@@ -1,68 +1,17 @@
 //! The answers of right laws are those of their formulas, and their tangents those of differences.
 
-use std::io::Write;
-use std::path::Path;
-use std::process::Command;
-
-use crate::compiled::{c_law, host, mfront, stress_state, umat};
+use crate::compiled::{c_law, compile_text, described, host, mfront, stress_state, umat};
 use crate::steps::{assert_close, double_dot, general_step, green_lagrange, hooke};
 use crate::{LAMBDA, MU};
 use tangent_check::convention::{Components, Measure, Tensor};
+use tangent_check::finding::Verdict;
+use tangent_check::judge::check_columns;
 use tangent_check::law::{Law, Response, Step};
 use tangent_check::library::child::{Child, LIMIT};
-use tangent_check::library::{Caller, Description, Kind, LibraryLaw, Signature, StressState, c, empty_response, open};
-use tangent_check::matrix::Matrix;
+use tangent_check::library::{Caller, Description, Kind, LibraryLaw, Signature, StressState, c};
+use tangent_check::library::{empty_response, open, umat};
+use tangent_check::roads::{Perturbed, inputs_read, roads};
 use tangent_check::tensor::{IDENTITY, ZERO, determinant, inverse, product, sum, trace, transposed};
-
-/// The step with its last increment changed by `change` in a direction of the convention.
-fn perturbed(step: &Step, measure: Measure, direction: &Tensor, change: f64) -> Step {
-    let mut step = step.clone();
-    match measure {
-        Measure::PiolaByGradient => step.gradient = sum(&step.gradient, change, direction),
-        Measure::CauchyByStrain => step.strain_increment = sum(&step.strain_increment, change, direction),
-        _ => {
-            // exp(change · direction), up to an error of the fourth power of the change.
-            let [first, second] = [sum(&IDENTITY, change, direction), product(direction, direction)];
-            let third = product(&second, direction);
-            let exponential = sum(&sum(&first, change.powi(2) / 2.0, &second), change.powi(3) / 6.0, &third);
-            step.gradient = product(&exponential, &step.gradient);
-        }
-    }
-    step
-}
-
-/// The tangent by central differences of two steps, extrapolated.
-fn measured(caller: &mut dyn Caller, step: &Step) -> Matrix {
-    let convention = caller.signature().convention.clone();
-    let (stress, strain) = (&convention.stress, &convention.strain);
-    let full = convention.measure == Measure::PiolaByGradient;
-    let kirchhoff = convention.measure == Measure::JaumannKirchhoff;
-    let mut response = empty_response();
-    let mut tangent = Matrix::zeros(stress.pairs.len(), strain.pairs.len());
-    for (column, &(k, l)) in strain.pairs.iter().enumerate() {
-        let mut direction = ZERO;
-        direction[k][l] = if k == l { 1.0 } else { 1.0 / strain.shear };
-        if !full {
-            direction[l][k] = direction[k][l];
-        }
-        let mut at = |change: f64| {
-            let step = perturbed(step, convention.measure, &direction, change);
-            caller.call(&step, &mut response).unwrap();
-            let factor = if kirchhoff { determinant(&step.gradient) } else { 1.0 };
-            response.stress.iter().map(|stress| factor * stress).collect::<Vec<_>>()
-        };
-        // Strain increments are a thousand times smaller than the entries of F.
-        let h = if convention.measure == Measure::CauchyByStrain { 1e-6 } else { 1e-3 };
-        let values = [h, -h, h / 2.0, -h / 2.0].map(&mut at);
-        for row in 0..stress.pairs.len() {
-            let coarse = (values[0][row] - values[1][row]) / (2.0 * h);
-            let fine = (values[2][row] - values[3][row]) / h;
-            let factor = if kirchhoff { determinant(&step.gradient) } else { 1.0 };
-            tangent[(row, column)] = (4.0 * fine - coarse) / 3.0 / factor;
-        }
-    }
-    tangent
-}
 
 /// The response in this program and in the child, which must be the same to the last bit; and the tangent against differences.
 fn checked(description: &Description, step: &dyn Fn(&Signature) -> Step) -> Response {
@@ -74,8 +23,13 @@ fn checked(description: &Description, step: &dyn Fn(&Signature) -> Step) -> Resp
     inside.call(&step, &mut response).unwrap();
     outside.call(&step, &mut other).unwrap();
     assert_eq!(response, other);
-    let tangent = measured(&mut outside, &step);
-    assert_close(&response.tangent.entries, &tangent.entries, 1e-9, &inside.signature().name);
+    let mut law = LibraryLaw::new(Box::new(outside));
+    let read = inputs_read(&mut law, &step).unwrap();
+    let mut perturbed = Perturbed::new(&mut law, &step, roads(&read, inside.signature().convention.measure)[0]);
+    let value = perturbed.value(0, 0.0).unwrap();
+    let name = &inside.signature().name;
+    let finding = check_columns(name, &response.tangent, &value, &mut |k, h| perturbed.value(k, h));
+    assert_eq!(finding.verdict, Verdict::Consistent, "{finding:?}");
     response
 }
 
@@ -95,12 +49,7 @@ fn neo_hookean_umat() {
         let f = general_step(open(&description).unwrap().signature(), plane).gradient;
         let kirchhoff = product(&neo_hookean(&f), &transposed(&f));
         let cauchy = sum(&ZERO, 1.0 / determinant(&f), &kirchhoff);
-        assert_close(
-            &response.stress,
-            &tangent_check::library::umat::components(stress_state(plane), 1.0).vector(&cauchy),
-            1e-12,
-            "σ",
-        );
+        assert_close(&response.stress, &umat::components(stress_state(plane), 1.0).vector(&cauchy), 1e-12, "σ");
     }
 }
 
@@ -130,7 +79,7 @@ fn j2_umat() {
     for (plane, scale) in [(false, 1.0), (true, 1.0), (false, 1e-2)] {
         let Some(mut description) = umat("j2.f90", Measure::CauchyByStrain, &properties, 1) else { return };
         description.stress_state = stress_state(plane);
-        let components = tangent_check::library::umat::components(stress_state(plane), 1.0);
+        let components = umat::components(stress_state(plane), 1.0);
         let make = |signature: &Signature| {
             let mut step = general_step(signature, plane);
             step.strain_increment = sum(&ZERO, scale, &step.strain_increment);
@@ -164,7 +113,7 @@ fn viscoelastic_c() {
     let [e_n, e] = [green_lagrange(&step.gradient_before), green_lagrange(&step.gradient)];
     let decay = (-step.length / τ).exp();
     let branch = g * (1.0 - decay) * τ / step.length;
-    let components = tangent_check::library::umat::components(StressState::Solid, 1.0);
+    let components = umat::components(StressState::Solid, 1.0);
     let before = sum(&ZERO, decay, &components.symmetric_tensor(&state_before));
     let q = sum(&before, branch, &hooke(LAMBDA, MU, &sum(&e, -1.0, &e_n)));
     let p = product(&step.gradient, &sum(&hooke(LAMBDA, MU, &e), 1.0, &q));
@@ -230,8 +179,7 @@ fn mfront_small_strain() {
         assert_eq!(signature.properties, ["YoungModulus", "PoissonRatio"]);
         assert_eq!(signature.state[3], "ElasticStrain12");
         let step = make(signature);
-        let components =
-            Components { shear: 2f64.sqrt(), ..tangent_check::library::umat::components(stress_state(plane), 1.0) };
+        let components = Components { shear: 2f64.sqrt(), ..umat::components(stress_state(plane), 1.0) };
         assert_eq!([&signature.convention.stress, &signature.convention.strain], [&components; 2]);
         let turned =
             product(&product(&step.rotation, &components.symmetric_tensor(&step.state)), &transposed(&step.rotation));
@@ -264,24 +212,13 @@ end subroutine umat
 /// Each argument of a UMAT arrives: its value, its order of components, the length of CMNAME.
 #[test]
 fn every_argument() {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
-    let [source, library] = ["probe.f90", "libprobe.so"].map(|name| folder.join(name));
-    std::fs::write(&source, PROBE).unwrap();
-    let mut compiler = Command::new("gfortran");
-    let Ok(status) = compiler.args(["-shared", "-fPIC", "-o"]).arg(&library).arg(&source).status() else {
-        std::io::stderr().write_all(b"\n*** NOT TESTED: every_argument, there is no gfortran ***\n").unwrap();
-        return;
-    };
-    assert!(status.success());
-    let state = tangent_check::library::umat::state(72);
+    let Some(library) = compile_text("probe.f90", PROBE) else { return };
     let kind = Kind::Umat { material: "STEEL".into(), tangent: Measure::JaumannKirchhoff, temperature: 20.0 };
-    let description =
-        Description { library, kind, properties: vec![7.0, 8.0], state, stress_state: StressState::Solid };
+    let description = Description { kind, properties: vec![7.0, 8.0], state: umat::state(72), ..described(library) };
     let mut law = LibraryLaw::new(Box::new(Child::start(host(), description, LIMIT).unwrap()));
     let mut step = general_step(law.signature(), false);
     step.stress = vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
-    let [stress, engineering] =
-        [1.0, 2.0].map(|shear| tangent_check::library::umat::components(StressState::Solid, shear));
+    let [stress, engineering] = [1.0, 2.0].map(|shear| umat::components(StressState::Solid, shear));
     let turned = product(&product(&step.rotation, &stress.symmetric_tensor(&step.stress)), &transposed(&step.rotation));
     let wanted = [
         &stress.vector(&turned)[..],

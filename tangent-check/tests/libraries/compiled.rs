@@ -14,24 +14,31 @@ use tangent_check::library::{Description, Kind, StressState};
 pub fn compile(source: &str) -> Option<PathBuf> {
     static COMPILED: Mutex<Option<HashMap<String, Option<PathBuf>>>> = Mutex::new(None);
     let mut compiled = COMPILED.lock().unwrap();
-    compiled.get_or_insert_default().entry(source.into()).or_insert_with(|| compile_now(source)).clone()
+    let laws = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/laws");
+    compiled.get_or_insert_default().entry(source.into()).or_insert_with(|| compile_now(&laws, source)).clone()
 }
 
-fn compile_now(source: &str) -> Option<PathBuf> {
-    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let laws = here.join("../examples/laws");
+/// Compiles a source of a test.
+pub fn compile_text(source: &str, text: &str) -> Option<PathBuf> {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
+    std::fs::write(folder.join(source), text).unwrap();
+    compile_now(folder, source)
+}
+
+fn compile_now(sources: &Path, source: &str) -> Option<PathBuf> {
+    let include = Path::new(env!("CARGO_MANIFEST_DIR")).join("include");
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
     let library = folder.join(format!("lib{}.so", source.split('.').next().unwrap()));
     let compiler = if source.ends_with(".c") { "gcc" } else { "gfortran" };
     // Another process of these tests may be using the file: it is replaced in one move.
     let fresh = folder.join(format!("{source}.{}.so", std::process::id()));
     let mut command = Command::new(compiler);
-    command.args(["-O2", "-shared", "-fPIC", "-I"]).arg(here.join("include")).arg("-o").arg(&fresh);
+    command.args(["-O2", "-w", "-shared", "-fPIC", "-I"]).arg(include).arg("-o").arg(&fresh);
     if compiler == "gfortran" {
         // A Fortran module would leave a file in the folder of the sources.
         command.arg("-J").arg(folder);
     }
-    match command.arg(laws.join(source)).arg("-lm").status() {
+    match command.arg(sources.join(source)).arg("-lm").status() {
         Ok(status) => assert!(status.success(), "{compiler} does not compile {source}"),
         Err(error) => {
             let note = format!("\n*** NOT TESTED: {source}, because {compiler} cannot be started: {error} ***\n");
@@ -53,13 +60,19 @@ pub fn umat(source: &str, tangent: Measure, properties: &[f64], state: usize) ->
 }
 
 pub fn c_law(source: &str, name: &str, properties: &[f64]) -> Option<Description> {
-    Some(Description {
-        library: compile(source)?,
-        kind: Kind::C { name: name.into() },
-        properties: properties.into(),
+    let kind = Kind::C { name: name.into() };
+    Some(Description { kind, properties: properties.into(), ..described(compile(source)?) })
+}
+
+/// A UMAT without properties and internal variables.
+pub fn described(library: PathBuf) -> Description {
+    Description {
+        library,
+        kind: Kind::umat(),
+        properties: Vec::new(),
         state: Vec::new(),
         stress_state: StressState::Solid,
-    })
+    }
 }
 
 pub fn mfront(name: &str, properties: &[f64]) -> Option<Description> {

@@ -1,14 +1,13 @@
 //! Each fault of a library, of its file and of its input is a sentence, and nothing else stops.
 
-use std::io::Write;
 use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
 
-use crate::compiled::{c_law, compile, host, mfront, umat};
+use crate::compiled::{c_law, compile, compile_text, described, host, mfront, umat};
 use crate::steps::{assert_close, general_step};
 use crate::{LAMBDA, MU};
-use tangent_check::convention::Measure;
+use tangent_check::convention::{Components, Measure};
 use tangent_check::law::{Law, Step};
 use tangent_check::library::child::{Child, Host, LIMIT};
 use tangent_check::library::{Caller, Description, Kind, LibraryLaw, StressState, empty_response, open};
@@ -46,12 +45,8 @@ fn faults() {
             assert!(said.starts_with("Step 13 from time 0.25 to 0.75 with F = [["), "fault {fault}: {said}");
             child.call(&good, &mut response).unwrap();
             let stress = sum(&ZERO, 100.0, &good.strain_increment);
-            assert_close(
-                &response.stress,
-                &tangent_check::library::umat::components(StressState::Solid, 1.0).vector(&stress),
-                1e-12,
-                "σ after the fault",
-            );
+            let wanted = Components::abaqus(1.0).vector(&stress);
+            assert_close(&response.stress, &wanted, 1e-12, "σ after the fault");
         }
     }
 }
@@ -136,13 +131,7 @@ fn loading_fails() {
     let file = |name: &str, bytes: &[u8]| {
         let path = folder.join(name);
         std::fs::write(&path, bytes).unwrap();
-        Description {
-            library: path,
-            kind: Kind::umat(),
-            properties: Vec::new(),
-            state: Vec::new(),
-            stress_state: StressState::Solid,
-        }
+        described(path)
     };
     let machine = if cfg!(target_arch = "x86_64") { 183 } else { 62 };
     let mut foreign = [0; 64];
@@ -180,23 +169,6 @@ fn symbols_and_names() {
 /// nobody has is named.
 #[test]
 fn utilities() {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
-    let description = |name: &str, source: &str| {
-        let [file, library] = [format!("{name}.c"), format!("lib{name}.so")].map(|file| folder.join(file));
-        std::fs::write(&file, source).unwrap();
-        let status = Command::new("gcc").args(["-shared", "-fPIC", "-w", "-o"]).arg(&library).arg(&file).status();
-        match status {
-            Ok(status) => assert!(status.success()),
-            Err(_) => std::io::stderr().write_all(b"\n*** NOT TESTED: utilities, there is no gcc ***\n").unwrap(),
-        }
-        library.exists().then_some(Description {
-            library,
-            kind: Kind::umat(),
-            properties: Vec::new(),
-            state: Vec::new(),
-            stress_state: StressState::Solid,
-        })
-    };
     let source = "
         void umat_(double *s, double *v, double *c, double *e, double *p, double *r, double *rpl, double *t, double *d, double *dr,
                    double *eps, double *deps, double *time, double *dt, double *temp, double *dtemp, double *pre, double *dpre, char *name,
@@ -208,7 +180,7 @@ fn utilities() {
         }";
     let declared = ["getnumcpus_", "sprinc_", "sprind_", "sinv_", "MutexInit", "getjobname_", "rotsig_", "xit_"];
     let source = declared.map(|name| format!("int {name}();\n")).concat() + source;
-    let Some(known) = description("utilities", &source) else { return };
+    let Some(known) = compile_text("utilities.c", &source).map(described) else { return };
     let callers: [Box<dyn Caller>; 2] =
         [open(&known).unwrap(), Box::new(Child::start(host(), known.clone(), LIMIT).unwrap())];
     for mut caller in callers {
@@ -218,7 +190,7 @@ fn utilities() {
         let turned = product3(&step.rotation, &step.strain_increment, &transposed(&step.rotation));
         assert_close(&response.stress, &caller.signature().convention.strain.vector(&turned), 1e-14, "ROTSIG");
     }
-    let unknown = description("unknown", "void mine_(void); void umat_(void) { mine_(); }").unwrap();
+    let unknown = compile_text("unknown.c", "void mine_(void); void umat_(void) { mine_(); }").map(described).unwrap();
     if cfg!(target_os = "linux") {
         start_fails(unknown, "undefined symbol: mine_. Give or link the source file that has this routine, too.");
     }

@@ -1,5 +1,6 @@
 //! The laws of stories, and vectors and matrices of tensors in Abaqus' order 11, 22, 33, 12, 13, 23.
 
+use std::fmt::Debug;
 use tangent_check::convention::{Components, Convention, Measure, Tensor};
 use tangent_check::law::{CallFailed, Law, Response, Step};
 use tangent_check::matrix::Matrix;
@@ -15,19 +16,19 @@ pub enum Version {
     After,
 }
 
-/// The law of a story.
-pub struct Story {
+/// The law of a story. Its versions are those of one line, or of one number.
+pub struct Story<V = Version> {
     pub law: &'static str,
     pub measure: Measure,
     /// The internal variables at rest.
     pub rest: fn() -> Vec<f64>,
-    pub respond: fn(Version, &Step) -> Response,
+    pub respond: fn(V, &Step) -> Response,
 }
 
-/// A law of a story before or after the repair.
-pub struct Told<'a>(pub &'a Story, pub Version);
+/// A law of a story in one of its versions.
+pub struct Told<'a, V = Version>(pub &'a Story<V>, pub V);
 
-impl Law for Told<'_> {
+impl<V: Copy + Debug> Law for Told<'_, V> {
     fn name(&self) -> String {
         format!("{}, {:?}", self.0.law, self.1)
     }
@@ -79,6 +80,20 @@ pub fn rotation_term(stress: &Tensor, [i, j, k, l]: [usize; 4]) -> f64 {
         + stress[i][k] * delta(j, l)
         + delta(i, l) * stress[j][k]
         + stress[i][l] * delta(j, k))
+}
+
+/// Fibres in tension: g = a E exp(b E²) and h = dg/dE = a (1 + 2b E²) exp(b E²); zero in compression.
+pub fn tension(stiffness: f64, exponent: f64, strain: f64) -> (f64, f64) {
+    if strain <= 0.0 {
+        return (0.0, 0.0);
+    }
+    let growth = stiffness * (exponent * strain * strain).exp();
+    (growth * strain, growth * (1.0 + 2.0 * exponent * strain * strain))
+}
+
+/// A : B.
+pub fn double_dot(a: &Tensor, b: &Tensor) -> f64 {
+    a.as_flattened().iter().zip(b.as_flattened()).map(|(a, b)| a * b).sum()
 }
 
 /// C = Fᵀ F, C⁻¹ and J; NaN where F is singular.

@@ -8,7 +8,7 @@
 //! Before: the sheets take h of the fibres. Not modelled: the split into volume and shape, the shear of fibre against sheet, and
 //! the active stress. With fibres in compression, the historical `g1` kept the value of the ground substance; ours is 0 there.
 
-use crate::algebra::{RightCauchyGreen, Story, Version, matrix, vector};
+use crate::algebra::{RightCauchyGreen, Story, Version, double_dot, matrix, tension, vector};
 use crate::check::{assert_law_wrong, assert_not_named};
 use crate::neo_hooke;
 use tangent_check::convention::{Measure, Tensor};
@@ -26,15 +26,9 @@ const FIBRES: Family = Family { direction: [1.0, 0.0, 0.0], stiffness: 3.0, expo
 const SHEETS: Family = Family { direction: [0.0, 0.8, 0.6], stiffness: 0.5, exponent: 0.3 };
 
 impl Family {
-    /// g and h; zero in compression.
     fn tension(&self, c: &Tensor) -> (f64, f64) {
-        let stretched: f64 = (0..3).map(|i| (0..3).map(|j| self.structure(i, j) * c[i][j]).sum::<f64>()).sum();
-        let strain = stretched - 1.0;
-        if strain <= 0.0 {
-            return (0.0, 0.0);
-        }
-        let growth = self.stiffness * (self.exponent * strain * strain).exp();
-        (growth * strain, growth * (1.0 + 2.0 * self.exponent * strain * strain))
+        let strain = double_dot(&from_entries(|i, j| self.structure(i, j)), c) - 1.0;
+        tension(self.stiffness, self.exponent, strain)
     }
 
     fn structure(&self, i: usize, j: usize) -> f64 {
