@@ -1,7 +1,7 @@
 //! A mistake, which turns a right tangent into a wrong one. The list of all mistakes is in `list.rs`.
 
 use super::observation::{Elsewhere, Measured, Observation, is_shear};
-use crate::convention::{Convention, Measure, Tensor};
+use crate::convention::{Configuration, Convention, Measure, Tensor, convert, unit_strain};
 use crate::matrix::Matrix;
 use crate::tensor::{ZERO, determinant, polar, product3, transposed};
 
@@ -169,50 +169,41 @@ impl Candidate {
     fn converted(&self, convention: &Convention, observation: &Observation) -> Option<Matrix> {
         let at = &observation.at;
         let right = &observation.measured.tangent;
-        let without_stress = crate::convention::Configuration { stress: ZERO, ..at.clone() };
+        let without_stress = Configuration { stress: ZERO, ..at.clone() };
         match self.mistake {
             Mistake::NoGeometricPart => {
-                let truesdell = spatial_form(Measure::Truesdell);
-                let geometric = convert(&Matrix::zeros(6, 6), &truesdell, convention, at)?;
+                let truesdell = Convention::abaqus(Measure::Truesdell);
+                let geometric = convert(&Matrix::zeros(6, 6), &truesdell, convention, at).ok()?;
                 Some(right.mapped(|row, column| right[(row, column)] - geometric[(row, column)]))
             }
             Mistake::OtherMeasure(measure) => {
                 let other = Convention { measure, ..convention.clone() };
-                convert(right, convention, &other, at)
+                convert(right, convention, &other, at).ok()
             }
             Mistake::RateTerm([from, to]) => {
                 let [from, to] = [from, to].map(|measure| restricted(convention, measure));
-                let term = convert(&Matrix::zeros(right.rows, right.columns), &from, &to, at)?;
+                let term = convert(&Matrix::zeros(right.rows, right.columns), &from, &to, at).ok()?;
                 Some(right.mapped(|row, column| right[(row, column)] + term[(row, column)]))
             }
             Mistake::TakenForTruesdell(measure) => {
                 let other = restricted(convention, measure);
-                let taken = convert(right, convention, &other, at)?;
-                convert(&taken, &restricted(convention, Measure::Truesdell), convention, at)
+                let taken = convert(right, convention, &other, at).ok()?;
+                convert(&taken, &restricted(convention, Measure::Truesdell), convention, at).ok()
             }
             Mistake::WithoutSpin(measure) => {
                 let other = restricted(convention, measure);
-                let taken = convert(right, convention, &other, at)?;
-                convert(&taken, &restricted(convention, Measure::JaumannCauchy), convention, &without_stress)
+                let taken = convert(right, convention, &other, at).ok()?;
+                convert(&taken, &restricted(convention, Measure::JaumannCauchy), convention, &without_stress).ok()
             }
             _ => None,
         }
     }
 }
 
-fn convert(
-    tangent: &Matrix,
-    from: &Convention,
-    to: &Convention,
-    at: &crate::convention::Configuration,
-) -> Option<Matrix> {
-    crate::convention::convert(tangent, from, to, at).ok()
-}
-
 /// Q ℂ Qᵀ: the tangent in axes turned by Q.
 fn turned(convention: &Convention, right: &Matrix, q: &Tensor) -> Matrix {
     let column = |k: usize| {
-        let unit = crate::convention::unit_strain(convention, k);
+        let unit = unit_strain(convention, k);
         let strain = convention.strain.vector(&product3(&transposed(q), &unit, q));
         let stress = convention.stress.symmetric_tensor(&right.times(&strain));
         convention.stress.vector(&product3(q, &stress, &transposed(q)))
@@ -221,12 +212,7 @@ fn turned(convention: &Convention, right: &Matrix, q: &Tensor) -> Matrix {
     Matrix::from_columns(right.rows, &columns)
 }
 
-/// A spatial measure in Abaqus' six components.
-pub(super) fn spatial_form(measure: Measure) -> Convention {
-    Convention::abaqus(measure)
-}
-
 /// A spatial measure in as many of Abaqus' components as the convention has: six, or four in plane strain.
 fn restricted(convention: &Convention, measure: Measure) -> Convention {
-    if convention.plane() { Convention::abaqus_plane(measure) } else { spatial_form(measure) }
+    if convention.plane() { Convention::abaqus_plane(measure) } else { Convention::abaqus(measure) }
 }

@@ -1,46 +1,29 @@
 //! Terms with one coefficient: what is missing in a tangent, or too much.
 
-use super::mistakes::spatial_form;
 use super::observation::{AGREEMENT, Observation, VISIBLE, distance};
 use crate::convention::{Components, Configuration, Convention, Measure, Tensor, convert};
 use crate::finding::Diagnosis;
+use crate::listed::listed;
 use crate::matrix::Matrix;
 use crate::tensor::{IDENTITY, ZERO, determinant};
 
-/// A term that a tangent may lack.
-#[derive(Clone, Copy, PartialEq)]
-enum Term {
-    /// I ⊗ I.
-    Volume,
-    /// The fourth-order identity of symmetric tensors.
-    Identity,
-    /// The identity less ⅓ I ⊗ I.
-    Deviator,
-    /// σ ⊗ I.
-    StressVolume,
-    /// I ⊗ σ.
-    VolumeStress,
-    /// The geometric part; for the Jaumann rates H:D = D σ + σ D.
-    Geometric,
-    /// The right tangent itself.
-    Whole,
-    /// I ⊗ I of material axes, for ∂S/∂E.
-    MaterialVolume,
-    /// The identity of material axes, for ∂S/∂E.
-    MaterialIdentity,
+listed! {
+    /// A term that a tangent may lack.
+    #[derive(Clone, Copy, PartialEq)]
+    Term, name "The term in words.":
+    Whole "the right tangent",
+    Volume "I ⊗ I",
+    StressVolume "σ ⊗ I",
+    VolumeStress "I ⊗ σ",
+    /// For other measures than rates, dF S or what corresponds to it.
+    Geometric "H (H:D = D σ + σ D, the geometric part)",
+    Identity "the symmetric identity",
+    Deviator "the deviatoric identity",
+    /// For ∂S/∂E.
+    MaterialVolume "I ⊗ I in material axes",
+    /// For ∂S/∂E.
+    MaterialIdentity "the symmetric identity in material axes",
 }
-
-const TERMS: [(Term, &str); 9] = [
-    (Term::Whole, "the right tangent"),
-    (Term::Volume, "I ⊗ I"),
-    (Term::StressVolume, "σ ⊗ I"),
-    (Term::VolumeStress, "I ⊗ σ"),
-    (Term::Geometric, "H (H:D = D σ + σ D, the geometric part)"),
-    (Term::Identity, "the symmetric identity"),
-    (Term::Deviator, "the deviatoric identity"),
-    (Term::MaterialVolume, "I ⊗ I in material axes"),
-    (Term::MaterialIdentity, "the symmetric identity in material axes"),
-];
 
 /// The powers of J with which a term may come.
 const POWERS: [(i32, &str); 3] = [(0, ""), (-1, "/J"), (1, " J")];
@@ -50,7 +33,7 @@ impl Term {
     fn tangent(self, convention: &Convention, observation: &Observation) -> Option<Matrix> {
         let at = &observation.at;
         let without_stress = Configuration { stress: ZERO, ..at.clone() };
-        let truesdell = spatial_form(Measure::Truesdell);
+        let truesdell = Convention::abaqus(Measure::Truesdell);
         let spatial = |matrix: Matrix| convert(&matrix, &truesdell, convention, &without_stress).ok();
         let material = convention.measure == Measure::SecondPiolaByGreen;
         match self {
@@ -64,19 +47,14 @@ impl Term {
                 let identity = identity(&truesdell);
                 spatial(identity.mapped(|i, j| identity[(i, j)] - volume[(i, j)] / 3.0))
             }
-            Term::Geometric => self.geometric(convention, at),
+            Term::Geometric => {
+                let rate = if convention.measure.spatial() { Measure::JaumannKirchhoff } else { convention.measure };
+                let to = Convention { measure: rate, ..convention.clone() };
+                convert(&Matrix::zeros(6, 6), &truesdell, &to, at).ok()
+            }
             Term::MaterialVolume => material.then(|| dyad(convention, &IDENTITY, &IDENTITY)),
             Term::MaterialIdentity => material.then(|| identity(convention)),
         }
-    }
-
-    /// H for a spatial measure; dF S, or what corresponds to it, for others.
-    fn geometric(self, convention: &Convention, at: &Configuration) -> Option<Matrix> {
-        let none = Matrix::zeros(6, 6);
-        let part = |measure| {
-            convert(&none, &spatial_form(Measure::Truesdell), &Convention { measure, ..convention.clone() }, at)
-        };
-        part(if convention.measure.spatial() { Measure::JaumannKirchhoff } else { convention.measure }).ok()
     }
 }
 
@@ -107,10 +85,10 @@ fn identity(convention: &Convention) -> Matrix {
 pub(super) fn fit(convention: &Convention, observations: &[Observation]) -> Option<Diagnosis> {
     let mut sentences = Vec::new();
     let mut first = None;
-    for (term, name) in TERMS {
+    for term in Term::ALL {
         for (power, suffix) in POWERS {
             if let Some(coefficient) = coefficient(term, power, convention, observations) {
-                sentences.push(sentence(term, name, suffix, coefficient));
+                sentences.push(sentence(term, suffix, coefficient));
                 first = first.or(Some(coefficient));
             }
         }
@@ -124,14 +102,15 @@ pub(super) fn fit(convention: &Convention, observations: &[Observation]) -> Opti
     Some(Diagnosis { candidates: sentences, states_that_tell, coefficient, ..Diagnosis::alone(sentence) })
 }
 
-fn sentence(term: Term, name: &str, suffix: &str, coefficient: f64) -> String {
+fn sentence(term: Term, suffix: &str, coefficient: f64) -> String {
     match term {
         Term::Whole if suffix.is_empty() => {
             format!("Your tangent is the right one times {:.6}.", 1.0 + coefficient)
         }
         _ => {
             let sign = if coefficient < 0.0 { "less" } else { "and" };
-            format!("Your tangent is the right one {sign} the term {:.6}{suffix} times {name}.", coefficient.abs())
+            let (size, name) = (coefficient.abs(), term.name());
+            format!("Your tangent is the right one {sign} the term {size:.6}{suffix} times {name}.")
         }
     }
 }

@@ -236,7 +236,7 @@ impl Formula for Crystal {
         // The residual in the stresses τ_s: x_s + Σ stiff_sr Δγ_r(x) − τ_s, and its tangent.
         let slip = |x: &[Dual; 3]| {
             let mut g = number(old[3]);
-            // The strength at the end of the step, by a fixed number of iterations.
+            // The strength at the end of the step, to round-off.
             let rate = |x: Dual, g: Dual| {
                 let ratio = x / g;
                 ratio * ratio * ratio * ratio * ratio * inputs.length
@@ -244,7 +244,11 @@ impl Formula for Crystal {
             for _ in 0..40 {
                 let sum = x.iter().fold(number(0.0), |sum, x| sum + rate(if x.0 < 0.0 { -*x } else { *x }, g) * 1e-3);
                 let residual = g - number(old[3]) - sum * hardening;
-                g = g - residual / (number(1.0) + sum / g * (5.0 * hardening));
+                let change = residual / (number(1.0) + sum / g * (5.0 * hardening));
+                g = g - change;
+                if change.0.abs() <= f64::EPSILON * g.0 && change.1.abs() <= f64::EPSILON * g.1.abs() {
+                    break;
+                }
             }
             (x.map(|x| rate(x, g) * 1e-3), g)
         };
