@@ -27,7 +27,7 @@ pub struct History<const D: usize> {
     pub(crate) constrained: BTreeSet<usize>,
     /// Pairs of bodies that touched at the start.
     pub(crate) bonded: BTreeSet<[u32; 2]>,
-    /// The last load step, if the next one resets the grid.
+    /// The last load step, if the next one resets the grid and no surface has got more points since.
     pub(crate) equilibrium: Option<LastEquilibrium<D>>,
 }
 

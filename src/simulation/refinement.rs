@@ -20,7 +20,8 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         if !self.history.resets_grid() {
             return;
         }
-        for number in 0..self.loads.contacts.points.len() {
+        let count = self.loads.contacts.points.len();
+        for number in 0..count {
             let point = self.loads.contacts.points[number];
             let p = point.particle;
             if self.particles.is_solid(p) {
@@ -38,6 +39,10 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             if is_long && ends.iter().all(|x| self.grid.contains(x)) {
                 self.halve(number, axis, ends, t);
             }
+        }
+        // In load steps, the forces of new points would become a part of the out-of-balance force, and act on the bodies for good.
+        if self.loads.contacts.points.len() > count {
+            self.history.equilibrium = None;
         }
     }
 
