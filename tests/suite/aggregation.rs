@@ -1,5 +1,7 @@
 //! Aggregation: outer nodes follow inner ones. Tests of the quantities that aggregation keeps exact, and of the errors that it removes.
 
+mod rows;
+
 use crate::support::{Failure, Random, advance, scene};
 use bfree::aggregation::{Extension, Occupied, Pieces};
 use bfree::mechanics::check::direction;
@@ -38,24 +40,34 @@ fn nodes(pieces: Pieces, cells: &[([u32; 3], f64)], grid: [u32; 3]) -> Vec<[u32;
     all
 }
 
-/// Bodies drawn at random in a grid of 12 × 9 cells: in corners, at walls, in several parts.
-fn drawn(pieces: Pieces, random: &mut Random) -> (Vec<[u32; 3]>, Extension) {
-    let grid = [12, 9, 0];
+const GRID: [u32; 3] = [12, 9, 0];
+
+/// The cells of bodies drawn at random in [`GRID`]: in corners, at walls, in several parts.
+fn drawn_cells(pieces: Pieces, random: &mut Random) -> Vec<([u32; 3], f64)> {
     let more = u32::from(pieces.degree == 2);
     let mut cells = Vec::new();
     let low = [random.below(6) as u32, random.below(5) as u32];
     let high = [low[0] + 1 + random.below(6) as u32, low[1] + 1 + random.below(4) as u32];
-    for y in low[1]..=high[1].min(grid[1] - 1 + more) {
-        for x in low[0]..=high[0].min(grid[0] - 1 + more) {
+    for y in low[1]..=high[1].min(GRID[1] - 1 + more) {
+        for x in low[0]..=high[0].min(GRID[0] - 1 + more) {
             let share = [0.05, 0.3, 0.6, 1.0][random.below(4) as usize];
             if random.below(5) > 0 {
                 cells.push(([x, y, 0], share));
             }
         }
     }
+    cells
+}
+
+/// The nodes and the extension of bodies that occupy these cells of a grid.
+fn extension(pieces: Pieces, grid: [u32; 3], cells: Vec<([u32; 3], f64)>) -> (Vec<[u32; 3]>, Extension) {
     let nodes = nodes(pieces, &cells, grid);
     let extension = Extension::new(pieces, &Occupied { dimension: 2, grid, nodes: &nodes, cells });
     (nodes, extension)
+}
+
+fn drawn(pieces: Pieces, random: &mut Random) -> (Vec<[u32; 3]>, Extension) {
+    extension(pieces, GRID, drawn_cells(pieces, random))
 }
 
 #[test]

@@ -1,5 +1,8 @@
 //! Contact between bodies in whole runs: bodies meet where their surfaces touch, part freely, rub on each other, and keep momentum.
 
+mod search;
+mod unequal;
+
 use crate::support::{Failure, advance, assert_refused, built, in_threads, merged, restored, run_to, solid, with};
 use bfree::simulation::Simulation;
 use bfree::tensor::Vector;

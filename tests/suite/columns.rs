@@ -7,7 +7,7 @@ mod run;
 use crate::support::{Failure, merged, with};
 use bfree::field::Field;
 use nalgebra::{Matrix3, Rotation3, Vector3};
-use run::{Run, State};
+use run::{Run, State, Table};
 use serde_json::{Value, json};
 
 const LAMBDA: f64 = 900.0;
@@ -336,9 +336,23 @@ fn reactions_have_the_components_of_the_weight() -> Result<(), Failure> {
 #[test]
 fn the_torque_of_a_rotation_is_that_of_the_weight_about_its_axis() -> Result<(), Failure> {
     let (center, axis) = (Vector3::new(0.3, 0.45, 0.6), Vector3::new(0.3, 1.0, -0.5));
-    let rotation = json!({"center": center.as_slice(), "axis": axis.as_slice(), "angle": [[0, 0], [1, 0.4]]});
-    let region = json!({"box": {"min": [0, 0, 0], "max": [1, 0.3, 1]}});
-    let run = Run::of(&hanging(json!({"prescribed": [{"region": region, "rotation": rotation}]})))?;
+    let scene = |angle: f64| {
+        let rotation = json!({"center": center.as_slice(), "axis": axis.as_slice(), "angle": [[0, 0], [1, angle]]});
+        let region = json!({"box": {"min": [0, 0, 0], "max": [1, 0.3, 1]}});
+        hanging(json!({"prescribed": [{"region": region, "rotation": rotation}]}))
+    };
+    torque_of_a_rotation(&scene(0.4), center, axis)?;
+    // Two bodies of different size have nodes of their own, and one region holds them all. They reach no other node of it.
+    let bodies = json!([
+        elastic("block", [0.25; 3], [0.5, 0.75, 0.75]),
+        elastic("other", [0.625, 0.25, 0.375], [0.875, 0.625, 0.75])
+    ]);
+    torque_of_a_rotation(&merged(scene(-0.1), json!({"bodies": bodies, "contact": {}})), center, axis)
+}
+
+/// Compares the reaction and the torque about an axis with the weight.
+fn torque_of_a_rotation(scene: &Value, center: Vector3<f64>, axis: Vector3<f64>) -> Result<(), Failure> {
+    let run = Run::of(scene)?;
     let (states, reactions) = (run.snapshots("particles")?, run.table("reactions.csv")?);
     let name = reactions.0.keys().find_map(|name| name.strip_suffix("_torque")).ok_or("no torque")?;
     let (forces, torques) = (reactions.vectors(&format!("{name}_")), reactions.column(&format!("{name}_torque")));
@@ -349,7 +363,80 @@ fn the_torque_of_a_rotation_is_that_of_the_weight_about_its_axis() -> Result<(),
         let moment: Vector3<f64> = state.sum(|p| (state.position(p) - center).cross(&weight(p)));
         assert_near(torques[k - 1], -moment.dot(&axis.normalize()), 1e-8, "torque");
     }
-    assert!(torques.iter().all(|torque| torque.abs() > 0.1), "{torques:?}");
+    assert!(torques.len() == 2 && torques.iter().all(|torque| torque.abs() > 5e-3), "{torques:?}");
+    Ok(())
+}
+
+/// What the report says of a contact, against the rows of its table: `prefix` is that of its columns.
+fn assert_touched(touched: &Value, table: &Table, prefix: &str, end: f64) {
+    let column = |name: &str| table.column(&format!("{prefix}{name}"));
+    let number = |name: &str| touched[name].as_f64().unwrap_or(f64::NAN);
+    let (times, area) = (table.column("time"), column("area"));
+    let touches: Vec<f64> = times.iter().zip(area).filter(|(_, area)| **area > 0.0).map(|(time, _)| *time).collect();
+    let norm = |k: &usize| column("x")[*k].hypot(column("y")[*k]);
+    let strongest = (0..times.len()).max_by(|a, b| norm(a).total_cmp(&norm(b))).unwrap_or(0);
+    assert_eq!((number("since"), number("until")), (touches[0], touches[touches.len() - 1]), "{touched}");
+    assert!(number("since") > 0.0 && number("until") < end, "the contact begins and ends: {touched}");
+    assert_near(number("largest_force"), norm(&strongest), 1e-12 * norm(&strongest), "largest force");
+    assert_eq!(number("largest_at"), times[strongest]);
+    assert_eq!(number("largest_depth"), column("depth").iter().copied().fold(0.0, f64::max));
+    assert_eq!(number("friction_loss"), column("friction_loss")[times.len() - 1]);
+    assert_eq!(touched["force"], json!([0.0, 0.0]), "nothing touches at the end");
+}
+
+#[test]
+fn the_report_says_from_when_to_when_something_touched() -> Result<(), Failure> {
+    let moving = |name: &str, min: [f64; 2], max: [f64; 2], velocity: [f64; 2]| {
+        let material = json!({"neo_hookean": {"lambda": LAMBDA, "shear": SHEAR}});
+        json!({"name": name, "density": DENSITY, "shape": {"box": {"min": min, "max": max}}, "material": material, "velocity": velocity})
+    };
+    let run = Run::of(&json!({
+        "grid": {"size": [4, 2], "spacing": 0.125},
+        "time": {"step": 0.01, "end": 0.4},
+        "bodies": [
+            moving("falls", [0.5, 0.32], [1.0, 0.82], [0.5, -1.0]),
+            moving("left", [2.0, 1.0], [2.4, 1.4], [1.0, 0.0]),
+            moving("right", [2.44, 1.06], [2.84, 1.46], [-1.0, 0.0])
+        ],
+        "obstacles": [{"name": "floor", "shape": {"half_space": {"point": [0, 0.3], "normal": [0, 1]}}, "friction": 0.3},
+                      {"name": "far", "shape": {"half_space": {"point": [0, 1.9], "normal": [0, -1]}}}],
+        "contact": {"friction": 0.2}
+    }))?;
+    let report = run.report()?;
+    let one = |list: &str| -> Result<Value, Failure> {
+        let all = report[list].as_array().ok_or("no list")?;
+        assert_eq!(all.len(), 1, "{all:?}");
+        Ok(all[0].clone())
+    };
+    let (floor, pair) = (one("obstacles")?, one("pairs")?);
+    assert_eq!((&floor["name"], &pair["name"]), (&json!("floor"), &json!("left and right")));
+    assert_touched(&floor, &run.table("obstacles.csv")?, "floor_", 0.4);
+    assert_touched(&pair, &run.table("contacts.csv")?, "", 0.4);
+    Ok(())
+}
+
+#[test]
+fn the_pressure_at_a_point_is_the_sum_over_all_that_it_touches() -> Result<(), Failure> {
+    let floor = |name: &str, stiffness: f64| json!({"name": name, "shape": {"half_space": {"point": [0, 1], "normal": [0, 1]}}, "stiffness": stiffness});
+    let block = json!({"name": "block", "density": DENSITY, "shape": {"box": {"min": [1.5, 1], "max": [2.5, 2]}},
+                       "material": {"neo_hookean": {"lambda": LAMBDA, "shear": SHEAR}}});
+    let run = Run::of(&json!({
+        "grid": {"size": [4, 3], "spacing": 0.25},
+        "time": {"scheme": "none", "step": 0.5, "end": 1},
+        "bodies": [block],
+        "obstacles": [floor("hard", 3.0), floor("soft", 1.0)],
+        "prescribed": [{"region": {"box": {"min": [0, 1.9], "max": [4, 3]}}, "displacement": [[0, [0, 0]], [1, [0, -0.02]]]}],
+        "output": {"every": 0.5}
+    }))?;
+    let (surfaces, table) = (run.snapshots("contacts")?, run.table("obstacles.csv")?);
+    let last = &surfaces[surfaces.len() - 1];
+    let force = |name: &str| -table.column(&format!("{name}_y")).last().copied().unwrap_or(f64::NAN);
+    assert_near(force("hard"), 3.0 * force("soft"), 1e-9 * force("hard"), "forces in the ratio of the stiffnesses");
+    let pressed = last.sum(|p| last.scalar("pressure", p) * last.scalar("area", p));
+    assert_near(pressed, force("hard") + force("soft"), 1e-9 * pressed, "pressure");
+    // Without friction, the traction is the pressure along the normal of the floor.
+    let apart = (0..last.len()).map(|p| (last.vector("traction", p)[1] - last.scalar("pressure", p)).abs());
+    assert!(pressed > 1.0 && apart.fold(0.0, f64::max) < 1e-12 * pressed, "{pressed}");
     Ok(())
 }
 

@@ -124,6 +124,27 @@ fn energy_is_kept_in_contact_with_friction_and_moving_obstacles() -> Result<(), 
 }
 
 #[test]
+fn the_work_of_a_plate_that_pushes_a_body_is_its_energy() -> Result<(), Failure> {
+    let square = solid("square", 1000, json!({ "box": { "min": [0.5, 0.55], "max": [1, 1.05] } }));
+    let plate = json!({ "name": "plate", "shape": { "half_space": { "point": [0.49, 0], "normal": [1, 0] } },
+                        "velocity": [[0, [0, 0]], [0.1, [2, 0.5]]] });
+    let mut scene = merged(falling(), json!({ "obstacles": [plate], "bodies": [square] }));
+    scene["grid"] = json!({ "size": [4, 2], "spacing": 0.125, "reset": "never" });
+    scene["time"]["step"] = json!(0.005);
+    let mut simulation: Simulation<2> = built(&scene)?;
+    simulation.settings.newton.relative_tolerance = 1e-13;
+    let (mut touched, mut most) = (0, 0.0_f64);
+    while simulation.clock.time() < 0.2 {
+        touched += u32::from(simulation.advance()?.touches());
+        let energy = simulation.particles.kinetic_energy() + simulation.strain_energy() + simulation.contact_energy();
+        most = most.max((energy - simulation.external_work).abs());
+    }
+    let work = simulation.external_work;
+    assert!(touched > 5 && work > 0.01 && most < 1e-10 * work, "{touched} steps: {most:e} of {work}");
+    Ok(())
+}
+
+#[test]
 fn the_work_of_a_moving_wall_closes_the_balance() -> Result<(), Failure> {
     let square = solid("square", 1000, json!({ "box": { "min": [0, 0], "max": [1, 1] } }));
     let pulled = json!({ "left": { "velocity": [[0, [0, 0]], [0.1, [0, 2]]] } });

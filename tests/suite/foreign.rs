@@ -1,6 +1,7 @@
 //! Laws from shared libraries in scenes, compiled here from `examples/laws`.
 
 mod inputs;
+mod memory;
 
 use super::support::{Failure, built, failure, in_threads, restored, run_to, with};
 use bfree::material::{Law, allow_library};

@@ -252,6 +252,71 @@ fn a_free_obstacle_that_leaves_the_grid_is_told() -> Result<(), Failure> {
     Ok(())
 }
 
+/// A ball in the middle of a grid, and a block in a corner.
+fn ball<const D: usize>() -> Result<Simulation<D>, Failure> {
+    built(&json!({
+        "grid": { "size": vec![2.0; D], "spacing": 0.25 },
+        "time": { "step": 0.01, "end": 1 },
+        "bodies": [solid("block", 1000, json!({ "box": { "min": vec![0.25; D], "max": vec![0.75; D] } }))],
+        "obstacles": [{ "name": "ball", "shape": { "ball": { "center": vec![1.25; D], "radius": 0.2 } }, "free": { "density": 2 } }]
+    }))
+}
+
+/// Whether a run of `steps` steps tells that the ball has left the grid. The ball flies along an axis, by 0.1 in a step.
+fn tells_that_it_left<const D: usize>(
+    start: &Simulation<D>,
+    axis: usize,
+    sign: f64,
+    steps: usize,
+) -> Result<bool, Failure> {
+    let (mut simulation, folder) = (start.clone(), tempfile::tempdir()?);
+    let body = simulation.loads.contacts.obstacles[0].free.as_mut().ok_or("the obstacle is not free")?;
+    body.velocity[axis] = 10.0 * sign;
+    let mut recorder = Recorder::start(output(folder.path()), &simulation, Reference::of(&simulation))?;
+    for _ in 0..steps {
+        let step = simulation.advance()?;
+        recorder.record(&simulation, &step)?;
+    }
+    recorder.finish(&simulation, &serde_json::Map::new(), Outcome::Finished)?;
+    Ok(std::fs::read_to_string(folder.path().join("report.json"))?.contains("obstacle_gone"))
+}
+
+#[test]
+fn a_free_obstacle_leaves_through_any_face() -> Result<(), Failure> {
+    let (disc, ball) = (ball::<2>()?, ball::<3>()?);
+    // A ball around its bounding box has the radius 0.2 √2, or 0.2 √3 in 3D. It is outside after a way of 1.03 or 1.10, or of 1.53 or 1.60.
+    for (sign, steps) in [(1.0, 11), (-1.0, 16)] {
+        for axis in 0..2 {
+            assert!(tells_that_it_left(&disc, axis, sign, steps)?, "axis {axis}, {sign}: it is outside");
+            assert!(!tells_that_it_left(&disc, axis, sign, steps - 1)?, "axis {axis}, {sign}: a part of it is inside");
+        }
+        for axis in 0..3 {
+            assert!(tells_that_it_left(&ball, axis, sign, steps)?, "3D, axis {axis}, {sign}: it is outside");
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn a_free_obstacle_falls_with_the_curve_of_gravity() -> Result<(), Failure> {
+    let changes = [
+        ("/gravity", json!({ "acceleration": [3, -10], "curve": [[0, 0.5], [0.04, 1], [0.08, -0.5]] })),
+        ("/obstacles/0/shape/ball/center", json!([0.6, 2.2])),
+        ("/obstacles/0/free", json!({ "density": 2, "velocity": [0.5, 1], "spin": [-2] })),
+    ];
+    let mut simulation: Simulation<2> = built(&with(flying(), &changes))?;
+    // The trapezoidal rule of Newmark's method is exact for a curve with kinks at the ends of steps.
+    for (end, integral) in [(0.04, 0.03), (0.08, 0.04)] {
+        run_to(&mut simulation, end)?;
+        let velocity = free(&simulation)?.velocity;
+        for (k, wanted) in [0.5 + 3.0 * integral, 1.0 - 10.0 * integral].into_iter().enumerate() {
+            assert!((velocity[k] - wanted).abs() < 1e-12, "t = {end}, component {k}: {} {wanted}", velocity[k]);
+        }
+        assert!((velocity[5] + 2.0).abs() < 1e-12, "it spins with {}", velocity[5]);
+    }
+    Ok(())
+}
+
 #[test]
 fn in_one_dimension_nothing_spins() -> Result<(), Failure> {
     let scene = json!({

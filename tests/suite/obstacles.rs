@@ -206,6 +206,38 @@ fn a_surface_that_stretches_gets_more_points_and_a_restart_has_them() -> Result<
     Ok(())
 }
 
+/// A strip on a rough floor, under its weight, that is pulled to more than twice its length. Its surface gets more points on the way.
+#[test]
+fn halves_of_a_piece_of_surface_keep_its_elastic_slip_and_carry_the_weight() -> Result<(), Failure> {
+    let pulled = |from: f64, to: f64, way: f64| {
+        let region = json!({ "box": { "min": [from, 0], "max": [to, 2] } });
+        json!({ "region": region, "displacement": [[0, [0, null]], [1, [way, null]]] })
+    };
+    let mut simulation: Simulation<2> = built(&json!({
+        "grid": { "size": [4, 1.5], "spacing": 0.25, "reset": "every_step" },
+        "time": { "scheme": "none", "step": 0.05, "end": 1 },
+        "approximation": "linear",
+        "bodies": [solid("strip", 1000, json!({ "box": { "min": [1.5, 0.5], "max": [2.5, 1] } }))],
+        "obstacles": [{ "name": "floor", "shape": { "half_space": { "point": [0, 0.5], "normal": [0, 1] } }, "friction": 0.3 }],
+        "prescribed": [pulled(0.0, 1.6, -0.45), pulled(2.4, 4.0, 0.55)],
+        "gravity": { "acceleration": [0, -100] }
+    }))?;
+    let (start, weight) =
+        (simulation.loads.contacts.points.len(), 100.0 * simulation.particles.mass.iter().sum::<f64>());
+    while simulation.clock.time() < 1.0 - 1e-9 {
+        let floor = simulation.advance()?.obstacles[0];
+        let (deepest, time) = (floor.depth, simulation.clock.time());
+        assert!((floor.force[1] + weight).abs() < 1e-5 * weight, "t = {time}: {} of {weight}", floor.force[1]);
+        let (contacts, positions) = (&simulation.loads.contacts, &simulation.particles.position);
+        let anchors = contacts.points.iter().zip(&contacts.obstacles[0].anchors);
+        // An elastic slip is at most μ times the depth long, and a point that touches nothing has none.
+        let longest = anchors.map(|(point, anchor)| (positions[point.particle] - anchor)[0].abs()).fold(0.0, f64::max);
+        assert!(longest <= 0.3 * deepest * (1.0 + 1e-6), "t = {time}: {longest} {deepest}");
+    }
+    assert!(simulation.loads.contacts.points.len() > start && simulation.dissipated > 0.0, "{start} points stay");
+    Ok(())
+}
+
 #[test]
 fn a_particle_that_surfaces_leave_bare_becomes_a_part_of_the_surface() -> Result<(), Failure> {
     let mut simulation: Simulation<2> = built(&falling())?;

@@ -62,6 +62,38 @@ fn assert_close(found: &[f64], wanted: &[f64]) {
     }
 }
 
+/// Particles are sorted in memory as they move. Fields are those of their ids.
+#[test]
+fn fields_follow_their_particles_through_sorting() -> Result<(), Failure> {
+    let mut simulation = crate::support::scene::<2>("rebound.json", &["bodies.0.velocity=[2, 0.1]"])?;
+    simulation.loads.gravity = Some(Gravity { acceleration: Vector::from([0.0, 0.3]), curve: Curve::constant(1.0) });
+    simulation.set_velocity_on_nodes(|x| Vector::from([2.0 - 0.3 * (x[1] - 2.5), 0.1 + 0.3 * (x[0] - 2.5)]))?;
+    let (reference, start, order) =
+        (Reference::of(&simulation), simulation.particles.by_id(), simulation.particles.id.clone());
+    crate::support::advance(&mut simulation, 30)?;
+    let particles = &simulation.particles;
+    let is_sorted_by_id = particles.id.iter().zip(0..).all(|(id, place)| *id == place);
+    assert!(particles.id != order && !is_sorted_by_id, "nothing was sorted");
+    for place in 0..particles.len() {
+        let id = particles.id[place] as usize;
+        let moved = particles.position[place] - start.position[id];
+        let h = particles.displacement_gradient[place];
+        let cases = [
+            (Field::Position, particles.position[place].as_slice().to_vec()),
+            (Field::Displacement, moved.as_slice().to_vec()),
+            (Field::Velocity, particles.velocity[place].as_slice().to_vec()),
+            (Field::Mass, vec![particles.mass[place]]),
+            (Field::DeformationGradient, vec![1.0 + h[(0, 0)], h[(0, 1)]]),
+        ];
+        for (field, wanted) in cases {
+            let values = field.values(&simulation, &reference)?;
+            let width = values.len() / particles.len();
+            assert_eq!(values[width * id..][..wanted.len()], wanted, "{field:?} of particle {id}");
+        }
+    }
+    Ok(())
+}
+
 /// F = diag(λ, 1, 1): J = λ, σ_xx = (Λ/2 (λ² − 1) + G (λ² − 1)) / λ, and Λ/2 (λ² − 1) / λ across, in plane or not.
 fn uniaxial<const D: usize>() -> Result<(), Failure> {
     let stretch: f64 = 1.3;

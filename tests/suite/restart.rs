@@ -1,6 +1,7 @@
 //! A killed run continues with the same bits, and a faulty checkpoint is reported.
 
 mod arrays;
+mod state;
 
 use crate::support::{Failure, Random, Said, said};
 use serde_json::Value;

@@ -58,6 +58,10 @@ impl Run {
         Table::read(&self.folder.path().join("out").join(name))
     }
 
+    pub fn report(&self) -> Result<Value, Failure> {
+        Ok(serde_json::from_slice(&std::fs::read(self.folder.path().join("out/report.json"))?)?)
+    }
+
     /// The snapshots of all steps, from the start on.
     pub fn snapshots(&self, kind: &str) -> Result<Vec<State>, Failure> {
         let path = |k: usize| self.folder.path().join(format!("out/{kind}_{k:06}.vtu"));

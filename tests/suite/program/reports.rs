@@ -237,10 +237,68 @@ fn a_body_deep_in_an_obstacle_is_told_beyond_a_quarter_of_a_spacing() -> Result<
         }))?;
         let depth = report["obstacles"][0]["largest_depth"].as_f64().ok_or("no depth")?;
         assert!((depth / (parts * h) - 1.0).abs() < 0.02, "{depth}");
-        let kinds: Vec<_> =
-            report["warnings"].as_array().into_iter().flatten().map(|one| one["kind"].clone()).collect();
-        assert_eq!(kinds.contains(&"obstacle_deep".into()), is_told, "{warned}");
+        assert_eq!(kinds(&report).contains(&"obstacle_deep".into()), is_told, "{warned}");
     }
+    Ok(())
+}
+
+/// The kinds of the warnings of a report.
+fn kinds(report: &Value) -> Vec<Value> {
+    report["warnings"].as_array().into_iter().flatten().map(|one| one["kind"].clone()).collect()
+}
+
+/// Two blocks of height L together, whose contact has the stiffness s (Λ + 2G)/h, between a wall and one that moves by δ: one is
+/// δ h/(h + s L) deep in the other.
+#[test]
+fn a_body_deep_in_another_one_is_told_beyond_a_quarter_of_a_spacing() -> Result<(), Failure> {
+    let block = |name: &str, low: f64, high: f64| {
+        json!({"name": name, "density": 1, "shape": {"box": {"min": [0, low], "max": [2, high]}},
+               "material": {"neo_hookean": {"young": 1000, "poisson": 0}}})
+    };
+    for (parts, is_told) in [(0.24, false), (0.26, true)] {
+        let (h, stiffness) = (0.25, 0.05);
+        let moved = -parts * (h + 1.5 * stiffness);
+        let (_, warned, report) = ran(&json!({
+            "grid": {"size": [2, 1.5], "spacing": h}, "time": {"step": 0.25, "end": 1, "scheme": "none"}, "output": {},
+            "bodies": [block("lower", 0.0, 0.75), block("upper", 0.75, 1.5)],
+            "boundary": {"left": "sliding", "right": "sliding", "bottom": "sliding",
+                         "top": {"displacement": [[0, [null, 0]], [1, [null, moved]]]}},
+            "contact": {"stiffness": stiffness}
+        }))?;
+        let depth = report["pairs"][0]["largest_depth"].as_f64().ok_or("no depth")?;
+        assert!((depth / (parts * h) - 1.0).abs() < 0.02, "{depth}");
+        assert_eq!(kinds(&report).contains(&"obstacle_deep".into()), is_told, "{warned}");
+    }
+    Ok(())
+}
+
+/// A block slides faster and faster, so that kinetic energy and friction loss are largest at the end.
+#[test]
+fn a_loss_is_a_part_of_the_energy_with_what_friction_took() -> Result<(), Failure> {
+    let square = solid("square", 1000, json!({"box": {"min": [0.5, 0.55], "max": [1, 1.05]}}));
+    let (_, warned, report) = ran(&json!({
+        "grid": {"size": [6, 2], "spacing": 0.125}, "time": {"step": 0.01, "end": 0.6}, "output": {},
+        "bodies": [merged(square, json!({"velocity": [0, -0.5]}))],
+        "obstacles": [{"name": "floor", "friction": 0.5, "shape": {"half_space": {"point": [0, 0.5], "normal": [0, 1]}}}],
+        "gravity": {"acceleration": [6, -10]}
+    }))?;
+    let energy = |name: &str| report["energies"][name].as_f64().ok_or(name.to_owned());
+    let (total, friction) = (energy("kinetic")? + energy("strain")? + energy("dissipated")?, energy("dissipated")?);
+    let message = report["warnings"].as_array().and_then(|all| all.last()).and_then(|last| last["message"].as_str());
+    let message = message.filter(|text| text.starts_with("energy was lost")).ok_or(warned)?;
+    let number = |from: &str, to: &str| -> Result<f64, Failure> {
+        let (_, rest) = message.split_once(from).ok_or("no number")?;
+        Ok(rest.split(to).next().unwrap_or_default().parse()?)
+    };
+    let (lost, largest) = (number("took: ", ",")?, number("largest total energy ", ";")?);
+    let percent: f64 =
+        message.split(" %").next().and_then(|text| text.rsplit(", ").next()).ok_or("no percents")?.parse()?;
+    // The block bounces a little, so that its energy is not the largest in the very last step.
+    assert!(friction > 0.3 * total && largest > 0.999 * total && largest < 1.05 * total, "{total}: {message}");
+    assert!(
+        (lost + energy("balance")?).abs() < 1e-3 * lost && (100.0 * lost / largest - percent).abs() < 0.06,
+        "{message}"
+    );
     Ok(())
 }
 
