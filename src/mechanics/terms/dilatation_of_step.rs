@@ -191,8 +191,8 @@ impl<const D: usize, L: Law> Term<D> for DilatationOfStep<'_, D, L> {
 
     fn linearize(&self, at: Trial<'_, f64, D>, _: Part, into: &mut Linearized<D>) -> Result<(), Inadmissible> {
         let means = self.means(at.phi);
-        mutant!("mean dilatation of a step: the product lacks the coupling within a cell": { means.iter_mut().for_each(|mean| mean.stiffness = 0.0); });
-        let stiffness = means.iter().map(|mean| mean.stiffness).collect();
+        let stiffness: Vec<f64> = means.iter().map(|mean| mean.stiffness).collect();
+        mutant!("mean dilatation of a step: the product lacks the coupling within a cell": stiffness = vec![0.0; stiffness.len()]);
         let (cells, layout, supports) = (self.cells.clone(), CellLayout::of_step(D), self.step.supports);
         into.cells.push(CellRows::new(cells, layout, stiffness, supports, at.phi, |cell, p, g, lane, rows| {
             self.linearize_at(p, g, means[cell].pressure, lane, rows);
