@@ -5,7 +5,7 @@
 //! - its value, for every number type;
 //! - its energy, if it has a potential;
 //! - the size that its round-off is relative to;
-//! - its tangent, linearised at one φ, as [data](super::linearized).
+//! - its tangent, linearised at one φ, as data (`mechanics::linearized`).
 //!
 //! [`Equilibrium`](super::residual::Equilibrium) sums the terms of the list. Plans and checks go through the same list.
 
