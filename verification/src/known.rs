@@ -66,6 +66,7 @@ pub const KNOWN: &[Known] = &[
         cells: &[
             short_effort(&["LME 3, D = 2, eps = 0.5", "1e-13 off the hull: steps taken, of 5"], 3.0),
             short_effort(&["LME 0.8, D = 2, eps = 1", "1e-13 off the hull: steps taken, of 5"], 4.0),
+            short_effort(&["LME 3, D = 3, eps = 1", "1e-13 off the hull: steps taken, of 5"], 0.0),
         ],
     },
     Known {
@@ -97,7 +98,6 @@ pub const KNOWN: &[Known] = &[
             short_effort(&["cubic, D = 3", SPARSE], 8.0),
             short_effort(&["LME 3, D = 2", SPARSE], 59.0),
             short_effort(&["LME 3, D = 3", SPARSE], 11.0),
-            short_effort(&["LME 0.8, D = 2", SPARSE], 157.0),
             short_effort(&["LME 0.8, D = 3", SPARSE], 6.0),
         ],
     },
