@@ -29,7 +29,7 @@ const UNUSABLE: u8 = 2;
 /// an option is not allowed, or if the check cannot tell.
 pub fn run(name: &str, arguments: impl IntoIterator<Item = OsString>, host: Host) -> u8 {
     let checked = match options::parse(arguments) {
-        Ok(Request::Help) => print(options::HELP.replace("NAME", name).trim_end()).map(|()| 0),
+        Ok(Request::Help) => print(options::HELP.replace("PROGRAM", name).trim_end()).map(|()| 0),
         Ok(Request::Version) => print(&format!("tangent-check {}", env!("CARGO_PKG_VERSION"))).map(|()| 0),
         Ok(Request::Check(options)) => check(*options, host),
         Err(sentence) => Err(format!("{sentence} `{name} --help` lists the options.")),

@@ -88,6 +88,12 @@ fn sources_with_an_input_file() {
 }
 
 #[test]
+fn the_help_names_the_program_once_and_leaves_the_names_of_arguments() {
+    let (code, help, _) = run(Path::new("."), "--help");
+    assert!(code == 0 && help.contains("Usage: tangent-check FILE") && help.contains("--mfront NAME "), "{help}");
+}
+
+#[test]
 fn prints_and_time_are_limited() {
     let Some(folder) = folder("limits") else { return };
     let law = "factors.f90 law.for job.inp --tangent strain --properties 210e3,0.3,3";

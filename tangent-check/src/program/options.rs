@@ -7,11 +7,11 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// The help; NAME stands for the name of the program.
+/// The help; PROGRAM stands for the name of the program.
 pub(super) const HELP: &str = "\
 Checks that the tangent of a material law is the derivative of its stress.
 
-Usage: NAME FILE… [OPTIONS]
+Usage: PROGRAM FILE… [OPTIONS]
 
 Files:
   libmine.so            A shared library with the law, or instead
