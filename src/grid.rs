@@ -1,6 +1,6 @@
 //! The Cartesian background grid: node positions and numbering. It stores nothing per node.
 //!
-//! Nodes are numbered tile by tile. A tile is a cube of 64 nodes: 64, 8 × 8 or 4 × 4 × 4. So nodes that lie near each other have near numbers.
+//! Nodes are numbered brick by brick. A brick is a cube of 64 nodes: 64, 8 × 8 or 4 × 4 × 4. So nodes that lie near each other have near numbers.
 
 use crate::tensor::Vector;
 
@@ -8,11 +8,11 @@ use crate::tensor::Vector;
 /// the grid's origin.
 const ON_NODE: f64 = 32.0 * f64::EPSILON;
 
-/// Number of nodes in a tile.
-pub(crate) const TILE: u64 = 64;
+/// Number of nodes in a brick.
+pub(crate) const BRICK: u64 = 64;
 
-/// Edge of a tile in nodes.
-pub(crate) const fn tile_edge(dimension: usize) -> u64 {
+/// Edge of a brick in nodes.
+pub(crate) const fn brick_edge(dimension: usize) -> u64 {
     match dimension {
         1 => 64,
         2 => 8,
@@ -28,7 +28,7 @@ pub(crate) const fn tile_edge(dimension: usize) -> u64 {
 ///
 /// let grid = Grid { origin: Vector::from([0.0, -1.0]), spacing: 0.5, cells: [4, 2] };
 /// assert_eq!(grid.node_count(), 5 * 3);
-/// // The first axis runs fastest in a tile of 8 × 8 nodes; number and index are inverse to each other.
+/// // The first axis runs fastest in a brick of 8 × 8 nodes; number and index are inverse to each other.
 /// assert_eq!((grid.id([1, 0]), grid.id([0, 1]), grid.index(grid.id([3, 2]))), (1, 8, [3, 2]));
 /// assert_eq!(grid.position([4, 2]), Vector::from([2.0, 0.0]));
 /// ```
@@ -113,29 +113,29 @@ impl<const D: usize> Grid<D> {
         self.cells.iter().map(|&n| u64::from(n) + 1).product()
     }
 
-    /// Number of a node from its index along each axis. Tiles follow each other, and nodes within a tile; the first axis runs fastest.
+    /// Number of a node from its index along each axis. Bricks follow each other, and nodes within a brick; the first axis runs fastest.
     #[inline]
     pub fn id(&self, index: [u32; D]) -> u64 {
-        let (edge, tiles) = (tile_edge(D), self.tiles());
-        let (mut tile, mut local) = (0, 0);
+        let (edge, bricks) = (brick_edge(D), self.bricks());
+        let (mut brick, mut local) = (0, 0);
         for k in (0..D).rev() {
             let at = u64::from(index[k]);
-            tile = tile * tiles[k] + at / edge;
+            brick = brick * bricks[k] + at / edge;
             local = local * edge + at % edge;
         }
-        tile * TILE + local
+        brick * BRICK + local
     }
 
-    /// Tiles along each axis.
+    /// Bricks along each axis.
     #[inline]
-    fn tiles(&self) -> [u64; D] {
-        self.cells.map(|cells| (u64::from(cells) + 1).div_ceil(tile_edge(D)))
+    fn bricks(&self) -> [u64; D] {
+        self.cells.map(|cells| (u64::from(cells) + 1).div_ceil(brick_edge(D)))
     }
 
-    /// The numbers of a nodal field: those of all tiles.
+    /// The numbers of a nodal field: those of all bricks.
     #[inline]
     pub(crate) fn numbers_of_field(&self) -> u64 {
-        self.tiles().iter().product::<u64>() * TILE
+        self.bricks().iter().product::<u64>() * BRICK
     }
 
     /// Number of a node in one of several nodal fields on this grid. [`Self::index`] is the same in all fields.
@@ -163,9 +163,9 @@ impl<const D: usize> Grid<D> {
     /// Index along each axis of the node numbered `id`.
     #[inline]
     pub fn index(&self, id: u64) -> [u32; D] {
-        let edge = tile_edge(D);
-        let (tile, local) = (digits(id / TILE, self.tiles()), digits(id % TILE, [edge; D]));
-        std::array::from_fn(|k| (tile[k] * edge + local[k]) as u32)
+        let edge = brick_edge(D);
+        let (brick, local) = (digits(id / BRICK, self.bricks()), digits(id % BRICK, [edge; D]));
+        std::array::from_fn(|k| (brick[k] * edge + local[k]) as u32)
     }
 
     /// Position of the node with the given index.

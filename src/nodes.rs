@@ -1,7 +1,7 @@
-//! Active nodes have N ≠ 0 or ∇N ≠ 0 at some particle. They are numbered in the order of the [grid](Grid::id), tile by tile, so that nodes that lie
+//! Active nodes have N ≠ 0 or ∇N ≠ 0 at some particle. They are numbered in the order of the [grid](Grid::id), brick by brick, so that nodes that lie
 //! near each other have near numbers.
 
-use crate::grid::{Grid, TILE};
+use crate::grid::{BRICK, Grid};
 use crate::tensor::Vector;
 use std::sync::Arc;
 
@@ -24,23 +24,23 @@ use std::sync::Arc;
 /// ```
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Nodes {
-    /// The tiles with an active node, ascending.
-    tiles: Arc<Vec<Tile>>,
+    /// The bricks with an active node, ascending.
+    bricks: Arc<Vec<Brick>>,
     len: usize,
 }
 
-/// The active nodes of a tile.
+/// The active nodes of a brick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Tile {
-    /// The grid number of the first node of the tile, over 64.
+struct Brick {
+    /// The grid number of the first node of the brick, over 64.
     number: u64,
-    /// Bit k stands for the node k of the tile.
+    /// Bit k stands for the node k of the brick.
     active: u64,
     /// The active number of the first of them.
     first: u32,
 }
 
-impl Tile {
+impl Brick {
     /// The number of active nodes before the node k.
     fn before(self, k: u64) -> u32 {
         (self.active & ((1 << k) - 1)).count_ones()
@@ -51,21 +51,21 @@ impl Nodes {
     /// From grid numbers in any order, with repetitions.
     pub fn new(mut ids: Vec<u64>) -> Self {
         ids.sort_unstable();
-        Self::of_tiles(ids.into_iter().map(|id| (id / TILE, 1 << (id % TILE))).collect())
+        Self::of_bricks(ids.into_iter().map(|id| (id / BRICK, 1 << (id % BRICK))).collect())
     }
 
-    /// From the numbers of tiles, in any order, each with bits for its active nodes. A tile may occur several times, with other nodes.
-    pub(crate) fn of_tiles(mut parts: Vec<(u64, u64)>) -> Self {
+    /// From the numbers of bricks, in any order, each with bits for its active nodes. A brick may occur several times, with other nodes.
+    pub(crate) fn of_bricks(mut parts: Vec<(u64, u64)>) -> Self {
         parts.sort_unstable_by_key(|&(number, _)| number);
         let mut len = 0;
-        let tile = |same: &[(u64, u64)]| {
+        let brick = |same: &[(u64, u64)]| {
             let active = same.iter().fold(0, |all, (_, active)| all | active);
-            let tile = Tile { number: same[0].0, active, first: len };
+            let brick = Brick { number: same[0].0, active, first: len };
             len += active.count_ones();
-            tile
+            brick
         };
-        let tiles: Vec<Tile> = parts.chunk_by(|one, next| one.0 == next.0).map(tile).collect();
-        Self { tiles: Arc::new(tiles), len: len as usize }
+        let bricks: Vec<Brick> = parts.chunk_by(|one, next| one.0 == next.0).map(brick).collect();
+        Self { bricks: Arc::new(bricks), len: len as usize }
     }
 
     /// Number of active nodes.
@@ -80,7 +80,7 @@ impl Nodes {
 
     /// Grid numbers of the active nodes, ascending.
     pub fn ids(&self) -> impl Iterator<Item = u64> {
-        self.tiles.iter().flat_map(|tile| bits(tile.active).map(|k| tile.number * TILE + k))
+        self.bricks.iter().flat_map(|brick| bits(brick.active).map(|k| brick.number * BRICK + k))
     }
 
     /// Grid number of the active node with this number.
@@ -88,30 +88,30 @@ impl Nodes {
     /// # Panics
     /// There are not so many active nodes.
     pub fn id(&self, node: usize) -> u64 {
-        let tile = &self.tiles[self.tiles.partition_point(|tile| tile.first as usize <= node) - 1];
-        let mut active = tile.active;
-        (tile.first as usize..node).for_each(|_| active &= active - 1);
-        tile.number * TILE + u64::from(active.trailing_zeros())
+        let brick = &self.bricks[self.bricks.partition_point(|brick| brick.first as usize <= node) - 1];
+        let mut active = brick.active;
+        (brick.first as usize..node).for_each(|_| active &= active - 1);
+        brick.number * BRICK + u64::from(active.trailing_zeros())
     }
 
     /// Active number of the node with the grid number `id`.
     pub fn number(&self, id: u64) -> Option<usize> {
-        let at = self.tiles.binary_search_by_key(&(id / TILE), |tile| tile.number).ok()?;
-        let (tile, k) = (self.tiles[at], id % TILE);
-        (tile.active >> k & 1 == 1).then(|| (tile.first + tile.before(k)) as usize)
+        let at = self.bricks.binary_search_by_key(&(id / BRICK), |brick| brick.number).ok()?;
+        let (brick, k) = (self.bricks[at], id % BRICK);
+        (brick.active >> k & 1 == 1).then(|| (brick.first + brick.before(k)) as usize)
     }
 
-    /// The active numbers of the nodes 0 to 63 of a tile that has active nodes.
-    pub(crate) fn numbers_in(&self, tile: u64) -> impl Fn(u64) -> u32 {
-        let at = self.tiles.partition_point(|one| one.number < tile);
-        let tile = self.tiles[at];
-        move |k| tile.first + tile.before(k)
+    /// The active numbers of the nodes 0 to 63 of a brick that has active nodes.
+    pub(crate) fn numbers_in(&self, brick: u64) -> impl Fn(u64) -> u32 {
+        let at = self.bricks.partition_point(|one| one.number < brick);
+        let brick = self.bricks[at];
+        move |k| brick.first + brick.before(k)
     }
 
-    /// The number of active nodes with grid numbers below that of the first node of a tile, which is a multiple of 64.
+    /// The number of active nodes with grid numbers below that of the first node of a brick, which is a multiple of 64.
     pub(crate) fn before(&self, id: u64) -> usize {
-        let at = self.tiles.partition_point(|tile| tile.number < id / TILE);
-        self.tiles.get(at).map_or(self.len, |tile| tile.first as usize)
+        let at = self.bricks.partition_point(|brick| brick.number < id / BRICK);
+        self.bricks.get(at).map_or(self.len, |brick| brick.first as usize)
     }
 
     /// Index along each axis and position of every active node.

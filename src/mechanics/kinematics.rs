@@ -1,5 +1,5 @@
 //! Kinematics: from L = ∇_r u, the gradient of the motion since the last grid reset, to the deformation of a particle, and from its stress back to
-//! the nodes. Another kinematics differs here alone.
+//! the nodes. A scene with another kinematics would need another file than this one, and no other change of the terms.
 
 use crate::material::{MaterialState, NonPositiveJacobian};
 use crate::particles::Particles;
@@ -34,7 +34,7 @@ pub fn compose<T: Real, const D: usize>(l: &Tensor<T, D>, h_r: &Tensor<f64, D>) 
     l + h_r + l * h_r
 }
 
-/// σ = V₀ P F_rᵀ, the adjoint of [`compose`]: the force on a node is σ ∇_r N_I, and σ : L is the power V₀ P : Ḟ.
+/// σ = V₀ P F_rᵀ, the adjoint of [`compose`]: the force on a node is σ ∇_r N_I, and σ : L = V₀ P : δF with δF = L F_r.
 #[inline(always)]
 pub(crate) fn to_nodes<T: Real, const D: usize>(
     piola: &Tensor<T, D>,

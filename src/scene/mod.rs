@@ -239,7 +239,7 @@ impl Scene {
         self.bodies.iter().filter_map(|body| body.material.law(&mut Problems::default(), ""))
     }
 
-    /// What the keys of the scene say of the symmetry of the tangent.
+    /// The parts of the scene that make the tangent unsymmetric.
     fn unsymmetric(&self) -> Unsymmetric {
         let of_obstacles = self.obstacles.iter().map(|obstacle| obstacle.friction);
         let mut frictions = of_obstacles.chain(self.contact.iter().map(|contact| contact.friction));

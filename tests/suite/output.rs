@@ -1,5 +1,7 @@
 //! The output files of a run agree with the simulation and with each other.
 
+mod values;
+
 use crate::support::{Failure, body, built, output, solid};
 use bfree::approximation::{Approximation, Linear};
 use bfree::clock::Clock;
@@ -9,7 +11,7 @@ use bfree::material::{Lame, Material, NeoHookean};
 use bfree::mechanics::loads::{Curve, Gravity, Motion, Prescribed, Selection};
 use bfree::output::plot::{Look, plot_frames, plot_run};
 use bfree::output::vtu::Snapshot;
-use bfree::output::{Outcome, OutputError, OutputSettings, Place, Probe, Recorder, Reference, nearest};
+use bfree::output::{Outcome, OutputError, OutputSettings, Place, Probe, Recorder, Reference};
 use bfree::particles::Particles;
 use bfree::simulation::{AdvanceError, Simulation, StepError};
 use bfree::tensor::{Tensor, Vector};
@@ -50,92 +52,6 @@ fn settings<const D: usize>(directory: &Path) -> OutputSettings<D> {
 
 /// The offset from a particle to a point beside it.
 const ASIDE: Vector<f64, 2> = Vector::<f64, 2>::new(0.03, 0.06);
-
-fn at_particle<const D: usize>(simulation: &Simulation<D>, field: Field) -> Result<Vec<f64>, OutputError> {
-    field.values(simulation, &Reference::of(simulation))
-}
-
-fn assert_close(found: &[f64], wanted: &[f64]) {
-    assert_eq!(found.len(), wanted.len());
-    for (found, wanted) in found.iter().zip(wanted) {
-        assert!((found - wanted).abs() <= 1e-14 * wanted.abs().max(1.0), "{found} instead of {wanted}");
-    }
-}
-
-/// Particles are sorted in memory as they move. Fields are those of their ids.
-#[test]
-fn fields_follow_their_particles_through_sorting() -> Result<(), Failure> {
-    let mut simulation = crate::support::scene::<2>("rebound.json", &["bodies.0.velocity=[2, 0.1]"])?;
-    simulation.loads.gravity = Some(Gravity { acceleration: Vector::from([0.0, 0.3]), curve: Curve::constant(1.0) });
-    simulation.set_velocity_on_nodes(|x| Vector::from([2.0 - 0.3 * (x[1] - 2.5), 0.1 + 0.3 * (x[0] - 2.5)]))?;
-    let (reference, start, order) =
-        (Reference::of(&simulation), simulation.particles.by_id(), simulation.particles.id.clone());
-    crate::support::advance(&mut simulation, 30)?;
-    let particles = &simulation.particles;
-    let is_sorted_by_id = particles.id.iter().zip(0..).all(|(id, place)| *id == place);
-    assert!(particles.id != order && !is_sorted_by_id, "nothing was sorted");
-    for place in 0..particles.len() {
-        let id = particles.id[place] as usize;
-        let moved = particles.position[place] - start.position[id];
-        let h = particles.displacement_gradient[place];
-        let cases = [
-            (Field::Position, particles.position[place].as_slice().to_vec()),
-            (Field::Displacement, moved.as_slice().to_vec()),
-            (Field::Velocity, particles.velocity[place].as_slice().to_vec()),
-            (Field::Mass, vec![particles.mass[place]]),
-            (Field::DeformationGradient, vec![1.0 + h[(0, 0)], h[(0, 1)]]),
-        ];
-        for (field, wanted) in cases {
-            let values = field.values(&simulation, &reference)?;
-            let width = values.len() / particles.len();
-            assert_eq!(values[width * id..][..wanted.len()], wanted, "{field:?} of particle {id}");
-        }
-    }
-    Ok(())
-}
-
-/// F = diag(λ, 1, 1): J = λ, σ_xx = (Λ/2 (λ² − 1) + G (λ² − 1)) / λ, and Λ/2 (λ² − 1) / λ across, in plane or not.
-fn uniaxial<const D: usize>() -> Result<(), Failure> {
-    let stretch: f64 = 1.3;
-    let mut h = Tensor::<f64, D>::zeros();
-    h[(0, 0)] = stretch - 1.0;
-    let simulation = single(h)?;
-    let across = LAMBDA / 2.0 * (stretch * stretch - 1.0) / stretch;
-    let along = across + SHEAR * (stretch * stretch - 1.0) / stretch;
-    assert_close(&at_particle(&simulation, Field::Stress)?, &[along, across, across, 0.0, 0.0, 0.0]);
-    assert_close(&at_particle(&simulation, Field::PrincipalStress)?, &[along, across, across]);
-    assert_close(&at_particle(&simulation, Field::Pressure)?, &[-(along + 2.0 * across) / 3.0]);
-    assert_close(&at_particle(&simulation, Field::VonMises)?, &[along - across]);
-    assert_close(&at_particle(&simulation, Field::Jacobian)?, &[stretch]);
-    let strain = (stretch * stretch - 1.0) / 2.0;
-    assert_close(&at_particle(&simulation, Field::Strain)?, &[strain, 0.0, 0.0, 0.0, 0.0, 0.0]);
-    Ok(())
-}
-
-#[test]
-fn stresses_in_uniaxial_strain_are_those_by_hand_in_every_dimension() -> Result<(), Failure> {
-    uniaxial::<1>()?;
-    uniaxial::<2>()?;
-    uniaxial::<3>()
-}
-
-/// F = I + k e_x ⊗ e_y: J = 1 and σ = G (F Fᵀ − I), which tells the order of the components.
-#[test]
-fn stresses_in_simple_shear_are_those_by_hand() -> Result<(), Failure> {
-    let k = 0.7;
-    let mut h = Tensor::<f64, 3>::zeros();
-    h[(0, 1)] = k;
-    let simulation = single(h)?;
-    assert_close(&at_particle(&simulation, Field::Stress)?, &[SHEAR * k * k, 0.0, 0.0, SHEAR * k, 0.0, 0.0]);
-    // σ² − G k² σ − G² k² = 0 in the plane, and 0 across.
-    let [mean, radius] = [0.5 * k * k, k * (1.0 + 0.25 * k * k).sqrt()].map(|x| SHEAR * x);
-    assert_close(&at_particle(&simulation, Field::PrincipalStress)?, &[mean + radius, 0.0, mean - radius]);
-    let gradient = [1.0, k, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
-    assert_close(&at_particle(&simulation, Field::DeformationGradient)?, &gradient);
-    // E = ½ (FᵀF − I), not ½ (FFᵀ − I)
-    assert_close(&at_particle(&simulation, Field::Strain)?, &[0.0, k * k / 2.0, 0.0, k / 2.0, 0.0, 0.0]);
-    Ok(())
-}
 
 /// Rows of a table as text, by the name of the column.
 fn column(path: &Path, name: &str) -> Result<Vec<f64>, Failure> {
@@ -426,26 +342,6 @@ fn settings_that_make_no_sense_are_refused_with_their_numbers() -> Result<(), Fa
 }
 
 #[test]
-fn particles_are_asked_for_by_id_wherever_they_lie() -> Result<(), Failure> {
-    let start = falling()?;
-    let (reference, mut moved) = (Reference::of(&start), start.clone());
-    moved.rearrange(&(0..64).rev().collect::<Vec<_>>());
-    for id in [0, 17, 63] {
-        let mut position = Vec::new();
-        Field::Position.append(&moved, &reference, id, &mut position)?;
-        let x = start.particles.position[id];
-        assert_eq!(position, [x[0], x[1], 0.0]);
-        assert_eq!(nearest(&moved.particles, &x, None), Some((id, 0.0)));
-    }
-    let missing = Field::Position.append(&moved, &reference, 64, &mut Vec::new());
-    assert!(matches!(missing, Err(OutputError::NoParticle { particle: 64, particles: 64 })), "{missing:?}");
-    let other = Reference::of(&single::<2>(Tensor::zeros())?);
-    let other = Field::Displacement.append(&moved, &other, 3, &mut Vec::new());
-    assert!(matches!(other, Err(OutputError::Reference { reference: 1, particles: 64 })), "{other:?}");
-    Ok(())
-}
-
-#[test]
 fn the_report_shows_the_projection_of_attempts_that_failed() -> Result<(), Failure> {
     let directory = tempfile::tempdir()?;
     let mut simulation = falling()?;
@@ -461,17 +357,5 @@ fn the_report_shows_the_projection_of_attempts_that_failed() -> Result<(), Failu
     let shown: Vec<&Value> = attempts.iter().map(|attempt| &attempt["projection_iterations"]).collect();
     assert_eq!(shown, iterations.iter().map(|&n| json!(n)).collect::<Vec<_>>().iter().collect::<Vec<_>>());
     assert_eq!(report["counts"]["projection_iterations"], iterations.iter().sum::<usize>());
-    Ok(())
-}
-
-#[test]
-fn the_nearest_particle_is_looked_for_in_its_body() -> Result<(), Failure> {
-    let mut particles = falling()?.particles;
-    particles.body[0] = 1;
-    let far = Vector::from([1.0, 1.0]);
-    let distance = |p: usize| (particles.position[p] - far).norm();
-    assert_eq!(nearest(&particles, &far, None), Some((63, distance(63))));
-    assert_eq!(nearest(&particles, &far, Some(1)), Some((0, distance(0))));
-    assert_eq!(nearest(&particles, &far, Some(2)), None);
     Ok(())
 }

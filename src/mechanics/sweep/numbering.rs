@@ -1,28 +1,28 @@
 //! The numbers of the active nodes in the boxes of the blocks.
 
 use super::block::Block;
-use crate::grid::{Grid, TILE, tile_edge};
+use crate::grid::{BRICK, Grid, brick_edge};
 use crate::nodes::{Nodes, bits};
 use crate::parallel;
 use std::ops::Range;
 
-/// The part of a row of a box, along x, that lies in one tile of nodes.
+/// The part of a row of a box, along x, that lies in one brick of nodes.
 struct Part {
-    /// The number of the tile.
-    tile: u64,
-    /// The first node of the part in the tile, and its place in the box.
+    /// The number of the brick.
+    brick: u64,
+    /// The first node of the part in the brick, and its place in the box.
     node: u64,
     place: usize,
     /// The active nodes, as bits from the first node on.
     active: u64,
 }
 
-/// The parts of all rows of a box, tile by tile.
+/// The parts of all rows of a box, brick by brick.
 fn parts<const D: usize>(grid: &Grid<D>, block: &Block) -> impl Iterator<Item = Part> {
-    let (edge, low) = (tile_edge(D) as usize, block.origin.map(|k| k as usize));
+    let (edge, low) = (brick_edge(D) as usize, block.origin.map(|k| k as usize));
     let high: [usize; 3] = std::array::from_fn(|k| low[k] + block.size[k]);
-    let tiles = move |k: usize| low[k] / edge..high[k].div_ceil(edge);
-    let within = move |k: usize, tile: usize| low[k].max(tile * edge)..high[k].min((tile + 1) * edge);
+    let bricks = move |k: usize| low[k] / edge..high[k].div_ceil(edge);
+    let within = move |k: usize, brick: usize| low[k].max(brick * edge)..high[k].min((brick + 1) * edge);
     let rows = move |[tx, ty, tz]: [usize; 3]| {
         within(2, tz).flat_map(move |z| within(1, ty).map(move |y| (within(0, tx), y, z)))
     };
@@ -32,33 +32,33 @@ fn parts<const D: usize>(grid: &Grid<D>, block: &Block) -> impl Iterator<Item = 
         let at = [x.start, y, z];
         let id = grid.id_in(block.field, std::array::from_fn(|k| at[k] as u32));
         let place = row * block.size[0] + x.start - low[0];
-        (active != 0).then_some(Part { tile: id / TILE, node: id % TILE, place, active })
+        (active != 0).then_some(Part { brick: id / BRICK, node: id % BRICK, place, active })
     };
-    let tiles = tiles(2).flat_map(move |z| tiles(1).flat_map(move |y| tiles(0).map(move |x| [x, y, z])));
-    tiles.flat_map(rows).filter_map(part)
+    let bricks = bricks(2).flat_map(move |z| bricks(1).flat_map(move |y| bricks(0).map(move |x| [x, y, z])));
+    bricks.flat_map(rows).filter_map(part)
 }
 
-/// The tiles of a block, each with bits for its active nodes.
-fn tiles<const D: usize>(grid: &Grid<D>, block: &Block) -> Vec<(u64, u64)> {
-    let mut tiles: Vec<(u64, u64)> = Vec::new();
-    for Part { tile, node, active, .. } in parts(grid, block) {
-        match tiles.last_mut() {
-            Some((last, all)) if *last == tile => *all |= active << node,
-            _ => tiles.push((tile, active << node)),
+/// The bricks of a block, each with bits for its active nodes.
+fn bricks<const D: usize>(grid: &Grid<D>, block: &Block) -> Vec<(u64, u64)> {
+    let mut bricks: Vec<(u64, u64)> = Vec::new();
+    for Part { brick, node, active, .. } in parts(grid, block) {
+        match bricks.last_mut() {
+            Some((last, all)) if *last == brick => *all |= active << node,
+            _ => bricks.push((brick, active << node)),
         }
     }
-    tiles
+    bricks
 }
 
 /// Numbers the active nodes in the order of the grid, and tells each block the numbers in its box.
 pub(super) fn number<const D: usize>(grid: &Grid<D>, blocks: &mut [Block]) -> Nodes {
-    let nodes = Nodes::of_tiles(parallel::map(blocks.len(), &|b| tiles(grid, &blocks[b])).concat());
+    let nodes = Nodes::of_bricks(parallel::map(blocks.len(), &|b| bricks(grid, &blocks[b])).concat());
     parallel::for_each(blocks.iter_mut(), &|block: &mut Block| {
         let (mut numbers, mut places) = (std::mem::take(&mut block.nodes), std::mem::take(&mut block.places));
         numbers.clear();
         places.clear();
-        for Part { tile, node, place, active } in parts(grid, block) {
-            let number = nodes.numbers_in(tile);
+        for Part { brick, node, place, active } in parts(grid, block) {
+            let number = nodes.numbers_in(brick);
             for k in bits(active) {
                 numbers.push(number(node + k));
                 places.push((place + k as usize) as u32);

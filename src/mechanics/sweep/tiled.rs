@@ -39,7 +39,7 @@ pub(super) struct Tiled<const D: usize> {
 }
 
 impl<const D: usize> Tiled<D> {
-    /// [`super::Supports::new`] for a shape function that is a product. The new ones lie in the memory of `reused`, and sorting begins with its order.
+    /// [`super::Supports::new`] for a shape function that is a product. The arrays lie in the memory of `reused`, and sorting begins with the order of its particles.
     pub(super) fn new<A: ShapeFunction>(
         approximation: &A,
         product: &dyn Separable,

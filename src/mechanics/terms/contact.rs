@@ -157,14 +157,9 @@ impl<const D: usize, L: Law> Term<D> for ContactForce<'_, D, L> {
         Ok(())
     }
 
-    fn linearize(
-        &self,
-        Trial { phi, .. }: Trial<'_, f64, D>,
-        _: Part,
-        into: &mut Linearized<D>,
-    ) -> Result<(), Inadmissible> {
+    fn linearize(&self, at: Trial<'_, f64, D>, _: Part, into: &mut Linearized<D>) -> Result<(), Inadmissible> {
         let Step { loads, supports, .. } = self.step;
-        into.contacts = ContactRows::new(self.linearized(phi), loads.contacts.obstacles.len(), supports);
+        into.contacts = ContactRows::new(self.linearized(at.phi), loads.contacts.obstacles.len(), supports);
         Ok(())
     }
 }

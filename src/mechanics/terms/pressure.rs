@@ -56,17 +56,12 @@ impl<const D: usize> Term<D> for Pressure<'_, D> {
         }
     }
 
-    fn linearize(
-        &self,
-        Trial { phi, .. }: Trial<'_, f64, D>,
-        _: Part,
-        into: &mut Linearized<D>,
-    ) -> Result<(), Inadmissible> {
+    fn linearize(&self, at: Trial<'_, f64, D>, _: Part, into: &mut Linearized<D>) -> Result<(), Inadmissible> {
         let linearize = |point: &PressurePoint<D>| {
             let p = point.particle;
             PressureRow {
                 particle: p,
-                delta_f: identity::<f64, D>() + self.supports.gradient_at(p, phi),
+                delta_f: identity::<f64, D>() + self.supports.gradient_at(p, at.phi),
                 force: cofactor(&Kinematics(self.particles).reference(p)) * point.force,
             }
         };
