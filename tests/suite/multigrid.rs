@@ -53,14 +53,14 @@ pub fn same<const D: usize>(one: &Simulation<D>, other: &Simulation<D>) -> bool 
     one.position.iter().zip(&other.position).all(|(a, b)| (a - b).norm() < 1e-8)
 }
 
-/// A body of this many cells of edge ¼ along each axis, on a floor that holds it.
+/// A body of this many cells of edge ¼ along each axis, on a floor that holds it. Along x and z it begins in the middle of a coarse cell.
 fn few_cells(cells: [u32; 3], family: &Value) -> Result<Simulation<3>, Failure> {
-    let max = [0, 1, 2].map(|k| [0.25, 0.0, 0.5][k] + 0.25 * f64::from(cells[k]));
+    let max = [0, 1, 2].map(|k| [0.25, 0.0, 0.25][k] + 0.25 * f64::from(cells[k]));
     built(&json!({
         "grid": {"size": [1.5, 1.5, 1.5], "spacing": 0.25},
         "approximation": family,
         "time": {"step": 1, "end": 1, "scheme": "none"},
-        "bodies": [solid("body", 1000, json!({"box": {"min": [0.25, 0.0, 0.5], "max": max}}))],
+        "bodies": [solid("body", 1000, json!({"box": {"min": [0.25, 0.0, 0.25], "max": max}}))],
         "boundary": {"bottom": "fixed"},
         "gravity": {"acceleration": [8, -15, 4]},
         "solver": {"krylov": {"method": "conjugate_gradient", "forcing": {"fixed": 1e-8}}}
@@ -77,7 +77,7 @@ fn bodies_of_a_few_cells_are_held_on_every_level() -> Result<(), Failure> {
             let (many, plain) = iterations(simulation()?, Preconditioning::BlockJacobi)?;
             let (few, multigrid) = iterations(simulation()?, Preconditioning::Multigrid)?;
             assert!(same(&multigrid, &plain), "{cells:?} cells, {family}: multigrid moves the body elsewhere");
-            assert!(few <= many, "{cells:?} cells, {family}: {few} iterations, {many} without multigrid");
+            assert!(2.0 * few < many, "{cells:?} cells, {family}: {few} iterations, {many} without multigrid");
         }
     }
     Ok(())
