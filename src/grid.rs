@@ -132,7 +132,7 @@ impl<const D: usize> Grid<D> {
         self.cells.map(|cells| (u64::from(cells) + 1).div_ceil(brick_edge(D)))
     }
 
-    /// The numbers of a nodal field: those of all bricks.
+    /// The count of grid numbers that one nodal field takes: 64 for each brick of the box.
     #[inline]
     pub(crate) fn numbers_of_field(&self) -> u64 {
         self.bricks().iter().product::<u64>() * BRICK

@@ -54,7 +54,7 @@ pub(crate) type PressureChanges = Vec<Vec<f64>>;
 pub(crate) type FunctionsAt<'a, const D: usize> = dyn Fn(usize) -> Vec<(usize, Function<D>)> + 'a;
 
 impl<const D: usize> Linearized<D> {
-    /// Nothing.
+    /// The linearisation of no term.
     pub fn zero() -> Self {
         Self {
             mass: 0.0,
