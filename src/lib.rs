@@ -35,7 +35,7 @@
 //! [`simulation::Simulation::step`] is the following, in this order. Arc length, mean dilatation and aggregation are left out.
 //!
 //! **1. Shape functions.** A particle at xₙ is connected to the nodes with N ≠ 0 or ∇ₙN ≠ 0. A node connected to some particle is active
-//! ([`nodes::Nodes`]). The paper's local maximum-entropy functions (24)–(28) are, with D = x − x_I,
+//! ([`space::Nodes`]). The paper's local maximum-entropy functions (24)–(28) are, with D = x − x_I,
 //!
 //! ```text
 //! N_I = exp(−β̂ D·D + λ·D) / Z,    λ = argmin log Z,    ∇N_I = −N_I 𝐉⁻¹ D,    𝐉 = Σ_I N_I D ⊗ D
@@ -159,7 +159,6 @@ mod lanes;
 pub mod material;
 pub mod mechanics;
 pub mod memory;
-pub mod nodes;
 pub mod output;
 pub mod parallel;
 pub mod particles;
@@ -173,4 +172,5 @@ pub mod scene;
 pub mod shape;
 pub mod simulation;
 pub mod solver;
+pub mod space;
 pub mod tensor;

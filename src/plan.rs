@@ -7,11 +7,11 @@ pub use arrays::ArrayUse;
 use crate::approximation::ShapeFunction;
 use crate::material::Law;
 use crate::mechanics::dilatation::Cells;
+use crate::mechanics::loads::PrescribedDof;
 use crate::mechanics::loads::{Motion, Pressing, SurfaceLoad, SurfacePoint};
 use crate::mechanics::reference::GridReset;
 use crate::mechanics::sweep::{SupportError, Supports};
 use crate::mechanics::terms::planned;
-use crate::mechanics::unknowns::Unknowns;
 use crate::particles::Body;
 use crate::simulation::{SharedNodes, Simulation};
 use crate::solver::{Krylov, Preconditioning};
@@ -162,15 +162,14 @@ impl Plan {
         let supports = simulation.new_supports(None)?;
         let nodes = supports.active();
         let prescribed = simulation.prescribed(nodes);
-        let following = Unknowns::new(&supports, &prescribed).following_mask(supports.nodes());
-        let following: usize = following.into_iter().map(usize::from).sum();
+        let space = supports.space(prescribed.iter().map(PrescribedDof::place));
         let cells = mixed_cells(simulation, &supports);
         Ok(Self {
             dimension: D,
             particles: simulation.particles.solid_places().len(),
             grid_nodes: simulation.grid.node_count(),
             active_nodes: nodes.len(),
-            unknowns: D * supports.nodes() - prescribed.len() - following + cells,
+            unknowns: space.unknowns() + cells,
             grid_reset: simulation.settings.grid_reset,
             krylov: simulation.krylov(),
             preconditioner: simulation.preconditioner(),

@@ -19,11 +19,9 @@
 //! - If several good cells are equally near, the mean of their polynomials counts. So mirrored bodies have mirrored motions.
 
 mod bodies;
-mod followers;
 mod pieces;
 
 pub use bodies::Occupied;
-pub use followers::Followers;
 pub use pieces::Pieces;
 
 use crate::parallel;

@@ -134,8 +134,8 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
 
     fn check_along(&self, at: Trial<'_, f64, D>, along: Trial<'_, f64, D>) -> Result<(), CheckError> {
         let mut u = along.phi.to_vec();
-        self.unknowns.clear_prescribed(&mut u);
-        let (u, phi) = (&u, &*self.unknowns.extended(at.phi));
+        self.space.clear_prescribed(&mut u);
+        let (u, phi) = (&u, &*self.space.extended(at.phi));
         let (at, along) = (Trial { phi, ..at }, Trial { phi: u, ..along });
         let bound = self.worst_bound(phi)?;
         self.check_claims(phi)?;
@@ -176,7 +176,7 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
         let own: Vec<_> = at.dilatation.iter().zip(along.dilatation).map(|(&x, &d)| Dual64::new(x, d)).collect();
         let (nodes, cells) = self.residual_at(piece, Trial { phi: &phi, dilatation: &own })?;
         let mut nodes: Vec<_> = nodes.iter().map(|r| r.map(|x| x.eps)).collect();
-        self.unknowns.clear_prescribed(&mut nodes);
+        self.space.clear_prescribed(&mut nodes);
         let mut rows = Rows { nodes, cells: cells.iter().map(|x| Vector::from([x.eps])).collect() };
         rows.cells.resize(along.dilatation.len(), Vector::zeros());
         Ok(rows)
@@ -218,13 +218,13 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     /// Compares the diagonal blocks of a few nodes with the products of unit vectors at these nodes.
     fn check_blocks(&self, tangent: &Tangent<'_, D>, bound: f64) -> Result<(), CheckError> {
         let blocks = tangent.diagonal_blocks();
-        let prescribed = self.unknowns.prescribed_mask(blocks.len());
-        let follows = self.unknowns.following_mask(blocks.len());
+        let prescribed = self.space.prescribed_mask();
+        let follows = self.space.following_mask();
         let held = |node: usize, i: usize| prescribed[node * D + i] || follows[node * D + i];
-        let uncoupled = self.unknowns.uncoupled();
+        let uncoupled = self.space.uncoupled();
         let spread = (0..blocks.len()).step_by(blocks.len().div_ceil(BLOCKS).max(1));
         let leaders: Vec<usize> =
-            self.unknowns.followers.rows().filter_map(|(_, _, mut leaders)| Some(leaders.next()?.0)).collect();
+            self.space.followers().rows().filter_map(|(_, _, mut leaders)| Some(leaders.next()?.0)).collect();
         let followed = leaders.iter().copied().step_by(leaders.len().div_ceil(BLOCKS).max(1));
         for node in spread.chain(followed) {
             for i in (0..D).filter(|&i| !held(node, i)) {

@@ -49,8 +49,8 @@ impl<const D: usize> Tangent<'_, D> {
             aggregated: self.supports().extension().is_some(),
             degree: self.supports().extension().map_or(0, |extension| extension.degree()),
             nodes: self.supports().lattice_nodes(),
-            prescribed: self.unknowns.prescribed_mask(self.supports().nodes()),
-            follows: self.unknowns.following_mask(self.supports().nodes()),
+            prescribed: self.space.prescribed_mask(),
+            follows: self.space.following_mask(),
             ..LocalForm::default()
         };
         let mut places = FxHashMap::default();

@@ -1,11 +1,11 @@
 //! The mass operator M̃ = (1−ε) M + ε lumped(M), with M_IJ = Σ_p m N_I N_J (eq. 42): product, projection, diagonal.
 
-use crate::aggregation::Followers;
 use crate::mechanics::sweep::{At, Group, Mode, Supports, Weights};
 use crate::parallel::{self, PART};
 use crate::particles::Particles;
 use crate::pooled::Pooled;
 use crate::solver::{ConjugateGradientSettings, LinearError, LinearOperator, conjugate_gradient};
+use crate::space::Space;
 use crate::tensor::Vector;
 use std::borrow::Cow;
 
@@ -88,36 +88,36 @@ impl<const D: usize> Mass<'_, D> {
     /// # Errors
     /// The sums overflow.
     pub(crate) fn project(&self, fields: [&[Vector<f64, D>]; 2]) -> Result<(TwoFields<D>, usize), LinearError> {
-        let followers = followers(self.supports);
-        let lumped = restricted(&followers, self.lumped);
+        let space = self.supports.space([]);
+        let lumped = restricted(&space, self.lumped);
         let right = |field: &[Vector<f64, D>]| {
             let mut out: Pooled<Vector<f64, D>> = self.supports.field();
             self.supports.spread(&mut out, |p| field[p] * self.particles.mass[p]);
-            followers.restrict(&mut out);
+            space.restrict(&mut out);
             out
         };
         let (mut nodal, mut iterations) = (fields.map(right), 0);
-        let inverse_diagonal = (self.lumping < 1.0).then(|| self.inverse_diagonal(&followers));
+        let inverse_diagonal = (self.lumping < 1.0).then(|| self.inverse_diagonal(&space));
         let is_light = is_light(self.particles);
         for field in &mut nodal {
             match &inverse_diagonal {
-                Some(inverse_diagonal) => iterations += self.solve(&followers, &Jacobi(inverse_diagonal), field)?,
+                Some(inverse_diagonal) => iterations += self.solve(&space, &Jacobi(inverse_diagonal), field)?,
                 None => field.iter_mut().zip(&*lumped).for_each(|(w, &m)| *w /= m),
             }
             let light = field.iter_mut().zip(&*lumped).filter(|(_, m)| is_light(**m));
             light.for_each(|(w, _)| *w = Vector::zeros());
-            followers.extend(field);
+            space.extend(field);
         }
         Ok((nodal, iterations))
     }
 
     /// 1/M̃_II; zero at nodes without mass and at outer nodes.
-    fn inverse_diagonal(&self, followers: &Followers<D>) -> Pooled<f64> {
+    fn inverse_diagonal(&self, space: &Space<D>) -> Pooled<f64> {
         let mut diagonal = self.supports.pool().collect(self.lumped.iter().map(|m| self.lumping * m));
         self.supports.spread_with(Weights::Square, bytemuck::cast_slice_mut(&mut diagonal), |p| {
             Vector::from([(1.0 - self.lumping) * self.particles.mass[p]])
         });
-        for (outer, _, leaders) in followers.rows() {
+        for (outer, _, leaders) in space.followers().rows() {
             let own = std::mem::replace(&mut diagonal[outer], 0.0);
             leaders.for_each(|(leader, weight)| diagonal[leader] += weight * weight * own);
         }
@@ -130,7 +130,7 @@ impl<const D: usize> Mass<'_, D> {
     /// Solves by conjugate gradients from zero. If M̃ is singular, this gives the solution of least norm.
     fn solve(
         &self,
-        followers: &Followers<D>,
+        space: &Space<D>,
         jacobi: &Jacobi<'_, D>,
         field: &mut [Vector<f64, D>],
     ) -> Result<usize, LinearError> {
@@ -141,20 +141,15 @@ impl<const D: usize> Mass<'_, D> {
             max_iterations: 10 * right.len() + 100,
         };
         let (right, solution) = (bytemuck::cast_slice(&right), bytemuck::cast_slice_mut(field));
-        let operator = Restricted { mass: self, followers };
+        let operator = Restricted { mass: self, space };
         Ok(conjugate_gradient(&operator, jacobi, right, solution, &settings, self.supports.pool())?.iterations)
     }
 }
 
-/// The extension E without regard to prescribed values.
-pub(super) fn followers<const D: usize>(supports: &Supports<D>) -> Followers<D> {
-    Followers::new(supports.extension().cloned().unwrap_or_default(), std::iter::empty())
-}
-
 /// Eᵀ m of nodal masses; zero at outer nodes.
-pub(super) fn restricted<'a, const D: usize>(followers: &Followers<D>, mass: &'a [f64]) -> Cow<'a, [f64]> {
+pub(super) fn restricted<'a, const D: usize>(space: &Space<D>, mass: &'a [f64]) -> Cow<'a, [f64]> {
     let mut mass = Cow::Borrowed(mass);
-    for (outer, _, leaders) in followers.rows() {
+    for (outer, _, leaders) in space.followers().rows() {
         let mass = mass.to_mut();
         let own = std::mem::replace(&mut mass[outer], 0.0);
         leaders.for_each(|(leader, weight)| mass[leader] += weight * own);
@@ -165,17 +160,17 @@ pub(super) fn restricted<'a, const D: usize>(followers: &Followers<D>, mass: &'a
 /// Eᵀ M̃ E
 struct Restricted<'a, const D: usize> {
     mass: &'a Mass<'a, D>,
-    followers: &'a Followers<D>,
+    space: &'a Space<D>,
 }
 
 impl<const D: usize> LinearOperator for Restricted<'_, D> {
     fn apply(&self, x: &[f64], y: &mut [f64]) {
         let mut x: Pooled<Vector<f64, D>> = self.mass.supports.pool().collect(bytemuck::cast_slice(x).iter().copied());
-        self.followers.extend(&mut x);
+        self.space.extend(&mut x);
         let y: &mut [Vector<f64, D>] = bytemuck::cast_slice_mut(y);
         y.fill(Vector::zeros());
         self.mass.add_product(1.0, &x, y);
-        self.followers.restrict(y);
+        self.space.restrict(y);
     }
 }
 

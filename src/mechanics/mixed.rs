@@ -39,7 +39,7 @@ impl<const D: usize> MixedTangent<'_, D> {
 
     /// The number of entries of a nodal field.
     fn nodal(&self) -> usize {
-        D * self.tangent.supports().nodes()
+        self.tangent.space.entries()
     }
 
     /// δp of every cell per unit of its unknown.
@@ -66,8 +66,8 @@ impl<const D: usize> LinearOperator for MixedTangent<'_, D> {
 impl<const D: usize> MixedTangent<'_, D> {
     /// B_c K_II⁻¹ B_cᵀ of every cell, with the diagonal blocks K_II.
     fn compliance(&self) -> Vec<f64> {
-        let (unknowns, supports) = (&self.tangent.unknowns, self.tangent.supports());
-        let held = unknowns.prescribed_mask(supports.nodes());
+        let (space, supports) = (&self.tangent.space, self.tangent.supports());
+        let held = space.prescribed_mask();
         let mut blocks = self.tangent.diagonal_blocks();
         for (node, block) in blocks.iter_mut().enumerate() {
             let inverted = inverse(block);
@@ -75,7 +75,7 @@ impl<const D: usize> MixedTangent<'_, D> {
             let finite = inverted.iter().all(|x| x.is_finite());
             *block = Tensor::from_fn(|i, k| if finite && free(i) && free(k) { inverted[(i, k)] } else { 0.0 });
         }
-        let functions = |particle| unknowns.functions(supports, particle);
+        let functions = |particle| space.functions(supports, particle);
         self.tangent.mixed_cells().map_or_else(Vec::new, |rows| rows.compliance(&functions, &blocks))
     }
 
@@ -103,7 +103,7 @@ impl<const D: usize> SaddlePoint for MixedTangent<'_, D> {
 
     fn volume_changes(&self, u: &[f64], v: &mut [f64]) {
         let u: &[Vector<f64, D>] = bytemuck::cast_slice(u);
-        let extended = self.tangent.unknowns.extended_in(self.tangent.supports().pool(), u);
+        let extended = self.tangent.space.extended_in_pool(u);
         match self.tangent.mixed_cells() {
             Some(rows) => {
                 v.copy_from_slice(&rows.volume_changes(self.tangent.supports(), extended.as_deref().unwrap_or(u)));

@@ -7,7 +7,8 @@
 use crate::material::Law;
 use crate::mechanics::residual::{Equilibrium, Inadmissible};
 use crate::pooled::Pooled;
-use crate::solver::{LinearOperator, Linearization, LocalForm, NonlinearProblem, vector};
+use crate::solver::{LinearOperator, Linearization, LocalForm, NonlinearProblem};
+use crate::space::vector;
 use crate::tensor::Vector;
 
 /// Upper bound of the loads' share in the arc length. With a small share, the plane meets the path even where loads fall steeply.
@@ -80,7 +81,7 @@ impl<'a, const D: usize, L: Law> OnPath<'a, D, L> {
         rate: &[Vector<f64, D>],
         dt: f64,
     ) -> Result<Self, Inadmissible> {
-        let size = vector::norm(bytemuck::cast_slice(rate));
+        let size = start.space.norm(rate);
         let before = start.step.supports.pool().collect(start.step.nodal.moved(rate.len()));
         let direction = rate.iter().map(|rate| rate / size).collect();
         Ok(Self { path, start, force, at_start: force(path.load)?, before, direction, length: path.speed * dt })

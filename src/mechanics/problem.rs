@@ -12,7 +12,7 @@ impl<const D: usize, L: Law> NonlinearProblem for Equilibrium<'_, D, L> {
         let (nodes, cells) = r.split_at_mut(D * at.phi.len());
         let residual = bytemuck::cast_slice_mut(nodes);
         self.residual_into(at, residual)?;
-        self.unknowns.clear_prescribed(residual);
+        self.space.clear_prescribed(residual);
         cells.copy_from_slice(&self.cell_residuals(|_, _| true, at));
         Ok(())
     }

@@ -11,10 +11,11 @@ use crate::mechanics::sweep::{Mode, Number, Weights};
 use crate::mechanics::symmetry::Unsymmetric;
 use crate::mechanics::terms::{Piece, Role, Step, Terms};
 use crate::mechanics::trial::Trial;
-use crate::mechanics::unknowns::Unknowns;
 use crate::pooled::Pooled;
-use crate::solver::{Stop, vector};
+use crate::solver::Stop;
+use crate::space::{Space, vector};
 use crate::tensor::Vector;
+use std::sync::Arc;
 
 pub use crate::mechanics::kinematics::{Inadmissible, compose};
 
@@ -52,8 +53,8 @@ pub struct Equilibrium<'a, const D: usize, L> {
     pub terms: Terms<'a, D, L>,
     /// The prescribed degrees of freedom, which are not solved for.
     pub prescribed: &'a [PrescribedDof],
-    /// The unknowns.
-    pub(crate) unknowns: Unknowns<'a, D>,
+    /// The space of the nodal fields.
+    pub(crate) space: Arc<Space<D>>,
     /// Whether the dilatations of averaged cells are unknowns of their own: the mixed form.
     pub mixed: bool,
     /// A callback that can stop the solution.
@@ -63,8 +64,8 @@ pub struct Equilibrium<'a, const D: usize, L> {
 impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
     /// The equilibrium of a step with these prescribed degrees of freedom.
     pub fn new(step: Step<'a, D, L>, prescribed: &'a [PrescribedDof]) -> Self {
-        let unknowns = Unknowns::new(step.supports, prescribed);
-        Self { step, terms: Terms::of(&step), prescribed, unknowns, mixed: false, stop: None }
+        let space = step.supports.space(prescribed.iter().map(PrescribedDof::place));
+        Self { step, terms: Terms::of(&step), prescribed, space: space.into(), mixed: false, stop: None }
     }
 
     /// R(φ) at every active node. At prescribed degrees of freedom, R is the reaction.
@@ -113,7 +114,7 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
 
     /// The residuals of the averaged cells in the mixed form; empty in the displacement form.
     pub(crate) fn cell_residuals<T: Number>(&self, picked: impl Fn(&str, Role) -> bool, at: Trial<'_, T, D>) -> Vec<T> {
-        let phi = &*self.unknowns.extended(at.phi);
+        let phi = &*self.space.extended(at.phi);
         self.terms.cell_residuals(picked, Trial { phi, ..at })
     }
 
@@ -127,7 +128,7 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
         out: &mut [Vector<T, D>],
     ) -> Result<(), Inadmissible> {
         let magnitude = weights == Weights::Magnitude;
-        let phi = &*self.unknowns.extended(at.phi);
+        let phi = &*self.space.extended(at.phi);
         if !magnitude {
             out.fill(Vector::zeros());
             self.terms.add_at_nodes(&picked, phi, out);
@@ -148,8 +149,8 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
             })?;
         }
         match magnitude {
-            true => self.unknowns.followers.restrict_magnitudes(out),
-            false => self.unknowns.followers.restrict(out),
+            true => self.space.restrict_magnitudes(out),
+            false => self.space.restrict(out),
         }
         Ok(())
     }
@@ -167,7 +168,7 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
     /// The external nodal forces at φ, zero at prescribed degrees of freedom.
     pub(crate) fn free_external_force(&self, phi: &[Vector<f64, D>]) -> Result<Pooled<Vector<f64, D>>, Inadmissible> {
         let mut force = self.external_force(phi)?;
-        self.unknowns.clear_prescribed(&mut force);
+        self.space.clear_prescribed(&mut force);
         Ok(force)
     }
 
@@ -201,22 +202,22 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
 
     pub(crate) fn sensitivity_at(&self, at: Trial<'_, f64, D>) -> Result<f64, Inadmissible> {
         let mut out = self.magnitudes(at)?;
-        self.terms.add_sensitivity(&self.unknowns.extended(at.phi), &mut out)?;
-        self.unknowns.followers.restrict_magnitudes(&mut out);
+        self.terms.add_sensitivity(&self.space.extended(at.phi), &mut out)?;
+        self.space.restrict_magnitudes(&mut out);
         Ok(self.free_norm(out, at))
     }
 
     /// The norm of magnitudes over the unknowns of a trial state.
     fn free_norm(&self, mut field: Pooled<Vector<f64, D>>, at: Trial<'_, f64, D>) -> f64 {
-        self.unknowns.clear_prescribed(&mut field);
-        let nodes = vector::norm(bytemuck::cast_slice(&field));
+        self.space.clear_prescribed(&mut field);
+        let nodes = self.space.norm(&field);
         let cells = if at.dilatation.is_empty() { 0.0 } else { vector::norm(&self.terms.cell_magnitudes()) };
         nodes.hypot(cells)
     }
 
     fn magnitudes(&self, at: Trial<'_, f64, D>) -> Result<Pooled<Vector<f64, D>>, Inadmissible> {
         let mut out = self.step.supports.field();
-        self.terms.add_magnitudes_at_nodes(&self.unknowns.extended(at.phi), &mut out);
+        self.terms.add_magnitudes_at_nodes(&self.space.extended(at.phi), &mut out);
         self.sum_into(|_, _| true, Part::Whole, Weights::Magnitude, at, &mut out)?;
         Ok(out)
     }
@@ -246,12 +247,12 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
     /// # Errors
     /// See [`Self::residual`].
     pub fn potential<T: Number>(&self, phi: &[Vector<T, D>]) -> Option<Result<(T, f64), Inadmissible>> {
-        self.terms.energy(&self.unknowns.extended(phi))
+        self.terms.energy(&self.space.extended(phi))
     }
 
     /// The trial state in a vector of unknowns: those of the nodes, then those of the cells in the mixed form.
     pub(crate) fn trial<'x>(&self, x: &'x [f64]) -> Trial<'x, f64, D> {
-        let (nodes, dilatation) = x.split_at(D * self.step.supports.nodes());
+        let (nodes, dilatation) = x.split_at(self.space.entries());
         Trial { phi: bytemuck::cast_slice(nodes), dilatation }
     }
 
@@ -264,6 +265,6 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
 
     /// Sets the prescribed degrees of freedom of a field to zero.
     pub fn clear_prescribed<T: num_traits::Zero + Copy + nalgebra::Scalar>(&self, field: &mut [Vector<T, D>]) {
-        self.unknowns.clear_prescribed(field);
+        self.space.clear_prescribed(field);
     }
 }

@@ -6,7 +6,7 @@ use crate::material::Law;
 use crate::mechanics::residual::Equilibrium;
 use crate::mechanics::sweep::Supports;
 use crate::mechanics::terms::Step;
-use crate::nodes::Nodes;
+use crate::space::Nodes;
 use crate::tensor::Vector;
 use nalgebra::{DMatrix, DVector};
 use std::collections::{BTreeMap, BTreeSet};

@@ -9,13 +9,14 @@ use crate::mechanics::residual::{Equilibrium, Inadmissible};
 use crate::mechanics::sweep::{Group, Quadratic, Supports};
 use crate::mechanics::terms::Piece;
 use crate::mechanics::trial::Trial;
-use crate::mechanics::unknowns::Unknowns;
 use crate::parallel::{self, PART};
 use crate::particles::{Body, Particles};
 use crate::pooled::Pooled;
 use crate::solver::{LinearOperator, Linearization, LocalForm};
+use crate::space::Space;
 use crate::tensor::{Tensor, Vector};
 use num_dual::Dual64;
+use std::sync::Arc;
 
 /// The linearisation K(φ) as an operator.
 ///
@@ -49,7 +50,7 @@ use num_dual::Dual64;
 pub struct Tangent<'a, const D: usize> {
     /// M̃, the particles, and their shape functions.
     pub(super) mass: Mass<'a, D>,
-    pub(super) unknowns: Unknowns<'a, D>,
+    pub(super) space: Arc<Space<D>>,
     pub(super) data: Linearized<D>,
     pub(super) has_inertia: bool,
 }
@@ -67,11 +68,11 @@ impl<'a, const D: usize> Tangent<'a, D> {
     /// K u, with given changes of the pressures of averaged cells in place of those that u causes.
     pub(super) fn product_under(&self, u: &[Vector<f64, D>], pressures: Option<&[f64]>, out: &mut [Vector<f64, D>]) {
         parallel::for_each(out.chunks_mut(PART), &|out: &mut [Vector<f64, D>]| out.fill(Vector::zeros()));
-        let extended = self.unknowns.extended_in(self.supports().pool(), u);
+        let extended = self.space.extended_in_pool(u);
         self.data.add_product(&self.mass, extended.as_deref().unwrap_or(u), pressures, out);
-        mutant!("unknowns: forces stay at nodes that follow": { return self.unknowns.clear_prescribed(out); });
-        self.unknowns.followers.restrict(out);
-        self.unknowns.clear_prescribed(out);
+        mutant!("unknowns: forces stay at nodes that follow": { return self.space.clear_prescribed(out); });
+        self.space.restrict(out);
+        self.space.clear_prescribed(out);
     }
 
     /// The averaged cells whose dilatation is an unknown of its own.
@@ -83,32 +84,32 @@ impl<'a, const D: usize> Tangent<'a, D> {
     pub fn diagonal_blocks(&self) -> Pooled<Tensor<f64, D>> {
         let mut blocks: Pooled<Tensor<f64, D>> = self.supports().field();
         self.data.add_blocks_at_nodes(&self.mass, &mut blocks);
-        self.unknowns.restrict_blocks(&mut blocks);
-        let functions = |particle| self.unknowns.functions(self.supports(), particle);
+        self.space.restrict_blocks(&mut blocks);
+        let functions = |particle| self.space.functions(self.supports(), particle);
         self.data.add_blocks_of_functions(&functions, &mut blocks);
         if self.data.has_quadratic(&self.mass) {
             let quadratic = |group: Group<'_>, form: &mut Quadratic| self.data.add_quadratic(&self.mass, group, form);
             self.supports().blocks(&mut blocks, &quadratic);
             self.add_followers(&quadratic, &mut blocks);
         }
-        self.unknowns.finish_blocks(&mut blocks);
+        self.space.finish_blocks(&mut blocks);
         blocks
     }
 
     /// Corrects the blocks of inner nodes for the outer nodes that follow them.
     fn add_followers(&self, quadratic: &(dyn Fn(Group<'_>, &mut Quadratic) + Sync), blocks: &mut [Tensor<f64, D>]) {
         mutant!("unknowns: the diagonal blocks lack the nodes that follow": { return; });
-        if self.unknowns.followers.is_empty() {
+        if self.space.followers().is_empty() {
             return;
         }
-        let reached = self.unknowns.reached(self.supports());
+        let reached = self.space.reached(self.supports());
         let corrections = |group: Group<'_>| {
             let mut added = Vec::new();
             if group.particles.iter().any(|&p| reached[p as usize]) {
                 let mut form = Quadratic::zero();
                 quadratic(group, &mut form);
                 for (lane, &p) in group.particles.iter().enumerate().filter(|(_, p)| reached[**p as usize]) {
-                    self.unknowns.add_followers(self.supports(), p as usize, &form, lane, &mut added);
+                    self.space.add_followers(self.supports(), p as usize, &form, lane, &mut added);
                 }
             }
             added
@@ -147,9 +148,9 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
         piece: Option<Piece>,
         at: Trial<'_, f64, D>,
     ) -> Result<Tangent<'_, D>, Inadmissible> {
-        let data = self.terms.linearize(piece, Trial { phi: &self.unknowns.extended(at.phi), ..at })?;
+        let data = self.terms.linearize(piece, Trial { phi: &self.space.extended(at.phi), ..at })?;
         let has_inertia = !self.step.nodal.is_static();
-        Ok(Tangent { mass: self.step.mass(), unknowns: self.unknowns.clone(), data, has_inertia })
+        Ok(Tangent { mass: self.step.mass(), space: self.space.clone(), data, has_inertia })
     }
 
     /// A piece of K u by dual numbers: the derivative of the same piece of the residual, through the same transfer loop.

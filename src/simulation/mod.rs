@@ -16,7 +16,8 @@ mod step;
 mod touching;
 mod work;
 
-pub use crate::mechanics::loads::Reaction;
+pub use crate::mechanics::loads::PrescribedDof;
+use crate::mechanics::loads::Reaction;
 pub(crate) use compiled::as_type;
 pub use history::History;
 pub use next_step::NextStep;
@@ -34,7 +35,6 @@ use crate::mechanics::schemes::Alphas;
 use crate::mechanics::sweep::{Fields, Points, Supports};
 use crate::mechanics::symmetry::Unsymmetric;
 use crate::mechanics::transfer::Nodal;
-use crate::mechanics::unknowns::Unknowns;
 use crate::parallel::{self, PART};
 use crate::particles::{Body, Particles};
 use crate::pooled::Pool;
@@ -376,16 +376,16 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         }
         let supports = self.new_supports(None)?;
         let prescribed = self.prescribed(supports.active());
-        let unknowns = Unknowns::new(&supports, &prescribed);
+        let space = supports.space(prescribed.iter().map(PrescribedDof::place));
         let mut nodal = Nodal::at_rest(&self.particles, &supports);
         if self.loads.damping.is_some() {
-            nodal.velocity = self.project(&supports)?.with_prescribed(&prescribed).extended(&unknowns).velocity;
+            nodal.velocity = self.project(&supports)?.with_prescribed(&prescribed).extended(&space).velocity;
         }
         // Δφ = 0 and a_n = 0, so the inertia force is zero; damping acts on v_n.
         let equilibrium = self.equilibrium(&supports, &nodal, &prescribed, Alphas::START, self.clock.time());
         let unbalanced = equilibrium.residual::<f64>(&nodal.acceleration)?;
         nodal.accelerate(&self.particles, &supports, &unbalanced);
-        let nodal = nodal.with_prescribed(&prescribed).extended(&unknowns);
+        let nodal = nodal.with_prescribed(&prescribed).extended(&space);
         self.particles.acceleration = supports.values(&nodal.acceleration).to_vec();
         Ok(())
     }

@@ -8,8 +8,7 @@ use crate::mechanics::residual::Equilibrium;
 use crate::mechanics::schemes::Alphas;
 use crate::mechanics::sweep::Supports;
 use crate::mechanics::transfer::Nodal;
-use crate::mechanics::unknowns::Unknowns;
-use crate::nodes::Nodes;
+use crate::space::Nodes;
 use crate::tensor::Vector;
 
 /// The problem of the next step, built on a copy of the simulation.
@@ -51,7 +50,7 @@ impl<const D: usize, L: Law + Clone, A: ShapeFunction + Clone> Simulation<D, L, 
         simulation.find_candidates(&supports);
         let prescribed = self.prescribed(supports.active());
         let nodal = simulation.nodal(&supports, &prescribed)?.with_prescribed(&prescribed);
-        let nodal = nodal.extended(&Unknowns::new(&supports, &prescribed));
+        let nodal = nodal.extended(&supports.space(prescribed.iter().map(PrescribedDof::place)));
         let alphas = simulation.settings.scheme.balance(simulation.clock.step());
         Ok(NextStep { simulation, supports, nodal, prescribed, alphas })
     }

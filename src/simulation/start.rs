@@ -3,15 +3,15 @@
 use super::{Simulation, StepError};
 use crate::approximation::{AtSurface, Separable, ShapeFunction};
 use crate::material::Law;
+use crate::mechanics::extension::extension;
 use crate::mechanics::loads::{PrescribedDof, at_surface_points, prescribed_dofs};
 use crate::mechanics::residual::Equilibrium;
 use crate::mechanics::schemes::Alphas;
 use crate::mechanics::sweep::{Fields, Points, SupportError, Supports};
 use crate::mechanics::terms;
 use crate::mechanics::transfer::{Nodal, Projection};
-use crate::mechanics::unknowns::extension;
-use crate::nodes::Nodes;
 use crate::solver::LinearError;
+use crate::space::Nodes;
 
 impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// The shape functions of a step; those of the last step if the grid is not reset. The particles then lie in the order of the blocks.

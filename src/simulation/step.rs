@@ -5,10 +5,10 @@ use super::report::Spent;
 use super::{AdvanceError, FailedAttempt, Simulation, StepError, StepReport, compiled};
 use crate::approximation::ShapeFunction;
 use crate::material::Law;
+use crate::mechanics::loads::PrescribedDof;
 use crate::mechanics::sweep::Supports;
 use crate::mechanics::transfer::{Nodal, Update};
 use crate::mechanics::trial::Trial;
-use crate::mechanics::unknowns::Unknowns;
 use crate::phases::Phase;
 use crate::solver::NewtonReport;
 
@@ -60,7 +60,8 @@ impl<const D: usize, L: Law + 'static, A: ShapeFunction + 'static> Simulation<D,
 
         let projected = self.nodal(&supports, &prescribed)?;
         spent.projection_iterations = projected.iterations;
-        let nodal = projected.with_prescribed(&prescribed).extended(&Unknowns::new(&supports, &prescribed));
+        let space = supports.space(prescribed.iter().map(PrescribedDof::place));
+        let nodal = projected.with_prescribed(&prescribed).extended(&space);
         watch.lap(Phase::Projection, supports.passes());
 
         let Balance { equilibrium, phi, dilatation: [before, after], newton, load, cosine } =
@@ -75,7 +76,7 @@ impl<const D: usize, L: Law + 'static, A: ShapeFunction + 'static> Simulation<D,
         mutant!("step: Δφ is the motion to the balance, not to the end": { dphi.iter_mut().for_each(|dphi| *dphi *= theta); });
 
         let update = Update::new(&scheme.end(dt), &projected, &nodal, &prescribed, self.settings.wall_update, &dphi);
-        let mut update = update.with_dilatation(after).extended(&nodal, &equilibrium.unknowns);
+        let mut update = update.with_dilatation(after).extended(&nodal, &space);
         let error = self.local_error(&update, &supports, dt, &newton)?;
         self.smooth_and_check(&mut update, &supports, &nodal)?;
         let accounts = self.accounts(&equilibrium, &dphi, &before, &update)?;

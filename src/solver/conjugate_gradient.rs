@@ -1,8 +1,8 @@
 //! Preconditioned conjugate gradients (Saad, Iterative Methods for Sparse Linear Systems, 2nd ed., alg. 9.1).
 
-use super::vector::{axpy, dot, norm, norm_with, update_pair, xpby};
 use super::{LinearError, LinearOperator, LinearOutcome, LinearReport, begin, finite, true_residual};
 use crate::pooled::{Pool, Pooled};
+use crate::space::vector::{axpy, dot, norm, norm_with, update_pair, xpby};
 
 /// A curvature below this multiple of eps times the largest curvature so far is round-off in size and sign.
 const UNRESOLVED: f64 = 16.0;

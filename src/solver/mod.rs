@@ -10,7 +10,6 @@ mod newton;
 mod nonnegative;
 mod preconditioner;
 mod stop;
-pub mod vector;
 
 pub use conjugate_gradient::{ConjugateGradientSettings, conjugate_gradient};
 pub use forcing::Forcing;
@@ -27,6 +26,7 @@ pub(crate) use preconditioner::{multigrid_bytes, saddle_bytes};
 pub use stop::Stop;
 
 use crate::pooled::Pooled;
+use crate::space::vector;
 
 /// A square matrix that is known by its product with a vector.
 ///
@@ -342,7 +342,7 @@ fn true_residual(
 }
 
 #[cfg(test)]
-mod testing {
+pub(crate) mod testing {
     //! Dense matrices for the tests of this folder.
 
     use super::{BlockJacobi, LinearOperator, Linearization};

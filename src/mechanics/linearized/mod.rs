@@ -18,9 +18,9 @@ pub(crate) use contact::{ContactRow, ContactRows};
 pub(crate) use pressure::{PressureRow, PressureRows};
 pub(crate) use stress::StressRows;
 
+use crate::mechanics::effective::Function;
 use crate::mechanics::mass::Mass;
 use crate::mechanics::sweep::{At, Group, Mode, Quadratic, Supports};
-use crate::mechanics::unknowns::Function;
 use crate::tensor::{Tensor, Vector, identity, scaled};
 
 /// A linearised step.

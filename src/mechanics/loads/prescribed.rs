@@ -4,8 +4,8 @@ use super::curve::Curve;
 use super::motion_step::MotionStep;
 use super::rotation::Rotation;
 use crate::grid::Grid;
-use crate::nodes::Nodes;
 use crate::shape::Shape;
+use crate::space::Nodes;
 use crate::tensor::Vector;
 
 /// The prescribed motion g(t) of one component.
@@ -135,13 +135,20 @@ pub struct PrescribedDof {
     pub step: MotionStep,
 }
 
+impl PrescribedDof {
+    /// The node and the component.
+    pub(crate) fn place(&self) -> (usize, usize) {
+        (self.node, self.component)
+    }
+}
+
 /// The degrees of freedom prescribed in the step from `t` to `t + dt`, by node and component. `moved` is the nodal motion since the last
 /// grid reset. Right after a reset there is no such motion, and `moved` is empty.
 ///
 /// ```
 /// use bfree::grid::Grid;
 /// use bfree::mechanics::loads::{Curve, Motion, Prescribed, Selection, prescribed_dofs};
-/// use bfree::nodes::Nodes;
+/// use bfree::space::Nodes;
 /// use bfree::tensor::Vector;
 ///
 /// // A floor on which bodies slide, and a wall at the left that pushes with velocity 2.

@@ -2,8 +2,8 @@
 
 use super::block::Block;
 use crate::grid::{BRICK, Grid, brick_edge};
-use crate::nodes::{Nodes, bits};
 use crate::parallel;
+use crate::space::{Nodes, bits};
 use std::ops::Range;
 
 /// The part of a row of a box, along x, that lies in one brick of nodes.

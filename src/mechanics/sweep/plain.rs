@@ -9,8 +9,8 @@ use super::{Evaluate, Fill, Mode, Point};
 use crate::approximation::{Scratch, ShapeFunction, Support};
 use crate::grid::Grid;
 use crate::lanes::LANES;
-use crate::nodes::Nodes;
 use crate::parallel;
+use crate::space::Nodes;
 use crate::tensor::{Tensor, Vector};
 
 /// Number of groups that one task evaluates: enough to pay for a task.

@@ -8,9 +8,9 @@ use super::tiled::Tiled;
 use crate::aggregation::Extension;
 use crate::approximation::ShapeFunction;
 use crate::grid::Grid;
-use crate::nodes::Nodes;
 use crate::pooled::{Element, Pool, Pooled};
 use crate::scalar::Real;
+use crate::space::{Nodes, Space};
 use crate::tensor::{Tensor, Vector};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -198,6 +198,12 @@ impl<const D: usize> Supports<D> {
     /// A nodal field of zeros, one entry for each active node, from the memory pool.
     pub(crate) fn field<T: Element + num_traits::Zero>(&self) -> Pooled<T> {
         self.pool.filled(self.nodes.len(), T::zero())
+    }
+
+    /// The space of nodal fields with these prescribed values: (node, component).
+    pub(crate) fn space(&self, prescribed: impl IntoIterator<Item = (usize, usize)>) -> Space<D> {
+        let extension = self.extension.clone().unwrap_or_default();
+        Space::new(self.nodes.len(), extension, prescribed.into_iter().collect(), &self.pool)
     }
 
     /// The memory pool of the nodal fields.

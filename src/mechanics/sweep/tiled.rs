@@ -12,10 +12,10 @@ use super::points::{Points, SupportError};
 use crate::approximation::{ApproximationError, Scratch, Separable, ShapeFunction, Support};
 use crate::grid::Grid;
 use crate::lanes::LANES;
-use crate::nodes::Nodes;
 use crate::parallel;
 use crate::parallel::First;
 use crate::pooled::Pool;
+use crate::space::Nodes;
 use crate::tensor::Vector;
 
 /// Number of nodes in a range, over which one task adds the boxes of the blocks.

@@ -1,15 +1,14 @@
 //! Particle-to-grid transfer (eqs. 40–42).
 
-use crate::aggregation::Followers;
 use crate::mechanics::affine::affine;
 use crate::mechanics::loads::PrescribedDof;
-use crate::mechanics::mass::{Mass, followers, is_light, lumped, restricted};
+use crate::mechanics::mass::{Mass, is_light, lumped, restricted};
 use crate::mechanics::schemes::Alphas;
 use crate::mechanics::sweep::Supports;
-use crate::mechanics::unknowns::Unknowns;
 use crate::particles::Particles;
 use crate::pooled::Pooled;
 use crate::solver::LinearError;
+use crate::space::Space;
 use crate::tensor::Vector;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -88,10 +87,10 @@ impl<const D: usize> Nodal<D> {
         let mass = lumped(particles, supports);
         let mut fields = affine(particles, supports, &mass, [&particles.velocity, &particles.acceleration]);
         // E û with the same momentum as u: Eᵀ m û = Eᵀ (m u).
-        let followers = followers(supports);
-        for u in fields.iter_mut().filter(|_| !followers.is_empty()) {
+        let space = supports.space([]);
+        for u in fields.iter_mut().filter(|_| !space.followers().is_empty()) {
             u.iter_mut().zip(&mass).for_each(|(u, &m)| *u *= m);
-            divide(particles, &followers, &mass, u);
+            divide(particles, &space, &mass, u);
         }
         let [velocity, acceleration] = fields;
         Self { mass, velocity, acceleration, ..Self::default() }
@@ -162,14 +161,14 @@ impl<const D: usize> Nodal<D> {
     pub fn accelerate(&mut self, particles: &Particles<D>, supports: &Supports<D>, unbalanced: &[Vector<f64, D>]) {
         self.acceleration.iter_mut().zip(unbalanced).for_each(|(a, r)| *a = -r);
         mutant!("transfer: loads at t = 0 push the wrong way": { self.acceleration.iter_mut().for_each(|a| *a = -*a); });
-        divide(particles, &followers(supports), &self.mass, &mut self.acceleration);
+        divide(particles, &supports.space([]), &self.mass, &mut self.acceleration);
     }
 
     /// Applies E to velocity and acceleration, so that outer nodes follow the prescribed values of inner nodes.
-    pub(crate) fn extended(mut self, unknowns: &Unknowns<'_, D>) -> Self {
+    pub(crate) fn extended(mut self, space: &Space<D>) -> Self {
         if !self.is_static() {
-            unknowns.followers.extend(&mut self.velocity);
-            unknowns.followers.extend(&mut self.acceleration);
+            space.extend(&mut self.velocity);
+            space.extend(&mut self.acceleration);
         }
         self
     }
@@ -202,13 +201,13 @@ impl<const D: usize> Nodal<D> {
 }
 
 /// Replaces p by E û with Eᵀ m û = Eᵀ p; û is zero at light nodes.
-fn divide<const D: usize>(particles: &Particles<D>, followers: &Followers<D>, mass: &[f64], p: &mut [Vector<f64, D>]) {
+fn divide<const D: usize>(particles: &Particles<D>, space: &Space<D>, mass: &[f64], p: &mut [Vector<f64, D>]) {
     let is_light = is_light(particles);
-    followers.restrict(p);
-    for (p, &m) in p.iter_mut().zip(&*restricted(followers, mass)) {
+    space.restrict(p);
+    for (p, &m) in p.iter_mut().zip(&*restricted(space, mass)) {
         *p = if is_light(m) { Vector::zeros() } else { *p / m };
     }
-    followers.extend(p);
+    space.extend(p);
 }
 
 /// The particle-to-grid transfer of velocity and acceleration.

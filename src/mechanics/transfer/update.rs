@@ -10,10 +10,10 @@ use crate::mechanics::schemes::Alphas;
 use crate::mechanics::smoothing::Smoothing;
 use crate::mechanics::sweep::Supports;
 use crate::mechanics::trial::Trial;
-use crate::mechanics::unknowns::Unknowns;
 use crate::parallel::{self, First, PART};
 use crate::particles::{Body, Particles};
 use crate::pooled::{Pool, Pooled};
+use crate::space::Space;
 use crate::tensor::{Tensor, Vector};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -156,20 +156,20 @@ impl<'a, const D: usize> Update<'a, D> {
     }
 
     /// Applies E to the increments, so that outer nodes follow inner nodes that a wall has changed.
-    pub(crate) fn extended(mut self, nodal: &Nodal<D>, unknowns: &Unknowns<'_, D>) -> Self {
-        if nodal.is_static() || unknowns.followers.is_empty() {
+    pub(crate) fn extended(mut self, nodal: &Nodal<D>, space: &Space<D>) -> Self {
+        if nodal.is_static() || space.followers().is_empty() {
             return self;
         }
         let mut by_forces = self.delta_velocity.clone();
-        unknowns.followers.extend(&mut self.delta_velocity);
-        unknowns.followers.extend(&mut self.delta_acceleration);
+        space.extend(&mut self.delta_velocity);
+        space.extend(&mut self.delta_acceleration);
         // The change of outer nodes that follow a wall node is an impulse of the wall, too.
         by_forces.iter_mut().zip(&self.delta_velocity).zip(&nodal.mass).for_each(|((before, after), &m)| {
             *before = (after - *before) * m;
         });
-        unknowns.followers.restrict(&mut by_forces);
-        for (dof, impulse) in unknowns.prescribed.iter().zip(&mut self.impulses) {
-            *impulse += by_forces[dof.node][dof.component];
+        space.restrict(&mut by_forces);
+        for (&(node, component), impulse) in space.prescribed().iter().zip(&mut self.impulses) {
+            *impulse += by_forces[node][component];
         }
         self
     }

@@ -3,9 +3,9 @@
 #[cfg(test)]
 mod tests;
 
-use super::vector::{axpy, dot, norm, scaled};
 use super::{InvalidSetting, LinearError, LinearOperator, LinearOutcome, LinearReport, begin, true_residual};
 use crate::pooled::{Pool, Pooled};
+use crate::space::vector::{axpy, dot, norm, scaled};
 
 /// A vector is orthogonalised a second time if the first time leaves less than this part of it: 1/√2 (Daniel, Gragg, Kaufman,
 /// Stewart 1976).

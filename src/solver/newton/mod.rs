@@ -13,9 +13,9 @@ pub use settings::{Krylov, NewtonSettings};
 use super::conjugate_gradient::{ConjugateGradientSettings, conjugate_gradient};
 use super::forcing::LOOSEST;
 use super::gmres::{GmresSettings, gmres};
-use super::vector::{dot, norm, xpby};
 use super::{LinearOperator, LinearOutcome, LinearReport, Linearization, NonlinearProblem, Preconditioner};
 use crate::pooled::{Pool, Pooled};
+use crate::space::vector::{dot, norm, xpby};
 use settings::DEFAULT_RESTART;
 
 /// The part of the predicted decrease that a step must achieve (Armijo).

@@ -2,7 +2,7 @@
 
 use crate::pooled::Pool;
 use crate::solver::LinearOperator;
-use crate::solver::vector::{axpy, dot, scaled, update, update_pair, xpby};
+use crate::space::vector::{axpy, dot, scaled, update, update_pair, xpby};
 use nalgebra::DMatrix;
 
 /// A Chebyshev polynomial.

@@ -2,8 +2,9 @@
 
 use super::{GRID, drawn, drawn_cells, extension, pieces};
 use crate::support::{Failure, Random, built, irregular, solid};
-use bfree::aggregation::{Extension, Followers, Pieces};
+use bfree::aggregation::{Extension, Pieces};
 use bfree::simulation::Simulation;
+use bfree::space::Followers;
 use bfree::tensor::Vector;
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};

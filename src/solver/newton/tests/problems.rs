@@ -1,8 +1,8 @@
 //! Small problems with known answers.
 
 use crate::solver::testing::Dense;
-use crate::solver::vector::norm;
 use crate::solver::{Linearization, NonlinearProblem};
+use crate::space::vector::norm;
 
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("x = {0} is outside")]

@@ -2,12 +2,13 @@
 
 use super::form::LocalForm;
 use super::interpolation::Interpolation;
-use crate::aggregation::{Extension, Followers, Occupied, Pieces};
+use crate::aggregation::{Extension, Occupied, Pieces};
 use crate::parallel;
 use crate::solver::LinearOperator;
 use crate::solver::preconditioner::block_jacobi::multiply_blocks;
 use crate::solver::preconditioner::chebyshev::largest;
 use crate::solver::preconditioner::hats::{corners, nodes_of};
+use crate::space::Followers;
 use crate::tensor::{Tensor, Vector, identity, inverse};
 use nalgebra::DMatrix;
 use rustc_hash::FxHashMap;

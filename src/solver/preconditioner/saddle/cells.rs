@@ -1,8 +1,9 @@
 //! The cells of a system in motions and pressures, and their volume changes under hat functions of the grid.
 
-use crate::aggregation::{Extension, Followers, Occupied, Pieces};
+use crate::aggregation::{Extension, Occupied, Pieces};
 use crate::solver::preconditioner::LocalForm;
 use crate::solver::preconditioner::hats::corners;
+use crate::space::Followers;
 use crate::tensor::{Tensor, Vector};
 use rustc_hash::{FxHashMap, FxHashSet};
 

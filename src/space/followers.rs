@@ -1,6 +1,6 @@
 //! The extension E applied to vector fields, some of whose components are prescribed.
 
-use super::Extension;
+use crate::aggregation::Extension;
 use crate::parallel;
 use crate::scalar::Real;
 use crate::tensor::Vector;
@@ -18,7 +18,8 @@ impl<const D: usize> Followers<D> {
     /// E without the pairs `(node, component)` in `prescribed`: a prescribed component does not follow.
     ///
     /// ```
-    /// use bfree::aggregation::{Extension, Followers, Occupied, Pieces};
+    /// use bfree::aggregation::{Extension, Occupied, Pieces};
+    /// use bfree::space::Followers;
     /// use bfree::tensor::Vector;
     ///
     /// let nodes: Vec<[u32; 3]> = (0..5).map(|i| [i, 0, 0]).collect();

@@ -9,7 +9,7 @@ use std::sync::Arc;
 ///
 /// ```
 /// use bfree::grid::Grid;
-/// use bfree::nodes::Nodes;
+/// use bfree::space::Nodes;
 /// use bfree::tensor::Vector;
 ///
 /// // Two particles in neighbouring cells of a grid of 100 × 100 cells share two of their nodes.

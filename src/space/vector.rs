@@ -5,7 +5,7 @@
 //! entries should be zero or lie between 1e-150 and 1e150 in magnitude. [`norm`] takes entries of any magnitude.
 //!
 //! ```
-//! use bfree::solver::vector::{axpy, dot, norm, scaled, xpby};
+//! use bfree::space::vector::{axpy, dot, norm, scaled, xpby};
 //!
 //! // One step of Gram and Schmidt: the remainder of y is orthogonal to x.
 //! let (mut x, mut y) = (vec![0.0; 3], vec![2.0, 1.0, 5.0]);
@@ -61,7 +61,7 @@ pub fn norm(x: &[f64]) -> f64 {
 }
 
 /// [`norm`], with `square` = x·x.
-pub(super) fn norm_with(square: f64, x: &[f64]) -> f64 {
+pub(crate) fn norm_with(square: f64, x: &[f64]) -> f64 {
     if (SAFE_SQUARE..=f64::MAX).contains(&square) {
         return square.sqrt();
     }
@@ -93,7 +93,7 @@ pub fn scaled(a: f64, x: &[f64], y: &mut [f64]) {
 }
 
 /// `yᵢ ← f(xᵢ, yᵢ)`
-pub(super) fn update(x: &[f64], y: &mut [f64], f: impl Fn(f64, f64) -> f64 + Sync) {
+pub(crate) fn update(x: &[f64], y: &mut [f64], f: impl Fn(f64, f64) -> f64 + Sync) {
     let chunk = |(x, y): (&[f64], &mut [f64])| {
         for (x, y) in x.iter().zip(y) {
             *y = f(*x, *y);
@@ -107,7 +107,7 @@ pub(super) fn update(x: &[f64], y: &mut [f64], f: impl Fn(f64, f64) -> f64 + Syn
 }
 
 /// Calls `f([aᵢ, bᵢ, …], xᵢ, yᵢ)` for all entries. Returns y·y.
-pub(super) fn update_pair<const N: usize>(
+pub(crate) fn update_pair<const N: usize>(
     given: [&[f64]; N],
     x: &mut [f64],
     y: &mut [f64],
@@ -127,8 +127,8 @@ pub(super) fn update_pair<const N: usize>(
 
 #[cfg(test)]
 mod tests {
-    use super::super::testing::irregular;
     use super::*;
+    use crate::solver::testing::irregular;
 
     #[test]
     fn reductions_do_not_depend_on_the_number_of_threads() {
