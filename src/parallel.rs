@@ -14,7 +14,7 @@ use std::time::Instant;
 ///
 /// # Errors
 /// The threads cannot be started, or their number was set before.
-pub fn use_threads(count: usize) -> Result<(), rayon::ThreadPoolBuildError> {
+pub(crate) fn use_threads(count: usize) -> Result<(), rayon::ThreadPoolBuildError> {
     rayon::ThreadPoolBuilder::new().num_threads(count).build_global()
 }
 

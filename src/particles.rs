@@ -278,7 +278,7 @@ impl<const D: usize> Particles<D> {
     }
 
     /// Sets the internal variables of every particle to the values at rest of its law.
-    pub fn set_internal_to_rest<L: Law>(&mut self, bodies: &[Body<L>]) {
+    pub(crate) fn set_internal_to_rest<L: Law>(&mut self, bodies: &[Body<L>]) {
         self.variable_count = bodies.iter().map(|body| body.law.internal_variables().len()).max().unwrap_or(0);
         let width = self.variable_count;
         let at_rest = |&body: &u32| {

@@ -54,7 +54,7 @@ impl Pool {
     }
 
     /// A vector of `count` unspecified elements, to be overwritten. Elements beyond the old contents are `value`.
-    pub fn unspecified<T: Element>(&self, count: usize, value: T) -> Pooled<T> {
+    pub(crate) fn unspecified<T: Element>(&self, count: usize, value: T) -> Pooled<T> {
         let mut vector = self.taken(count);
         vector.resize(count, value);
         Pooled { vector, pool: self.clone() }
@@ -102,7 +102,7 @@ pub struct Pooled<T: Element> {
 
 impl<T: Element> Pooled<T> {
     /// The pool of the vector.
-    pub fn pool(&self) -> &Pool {
+    pub(crate) fn pool(&self) -> &Pool {
         &self.pool
     }
 

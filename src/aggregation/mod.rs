@@ -135,7 +135,7 @@ impl Extension {
     }
 
     /// The degree of the functions, 1 to 3.
-    pub fn degree(&self) -> u32 {
+    pub(crate) fn degree(&self) -> u32 {
         self.degree
     }
 
@@ -155,7 +155,7 @@ impl Extension {
     }
 
     /// The inner nodes that the outer node `outer()[place]` follows, and their weights.
-    pub fn leaders(&self, place: usize) -> impl Iterator<Item = (usize, f64)> + use<'_> {
+    pub(crate) fn leaders(&self, place: usize) -> impl Iterator<Item = (usize, f64)> + use<'_> {
         let range = self.starts[place] as usize..self.starts[place + 1] as usize;
         self.leaders[range.clone()].iter().zip(&self.weights[range]).map(|(&leader, &weight)| (leader as usize, weight))
     }
@@ -166,7 +166,7 @@ impl Extension {
     }
 
     /// Bytes of all lists.
-    pub fn bytes(&self) -> usize {
+    pub(crate) fn bytes(&self) -> usize {
         let Self { outer, starts, leaders, weights, transpose, .. } = self;
         let numbers = outer.len() + starts.len() + leaders.len();
         let transposed = transpose.inner.len() + transpose.starts.len() + transpose.followers.len();

@@ -145,14 +145,14 @@ impl Place {
     /// # Errors
     /// The point is outside the axis, or the axis has no cells.
     #[inline]
-    pub fn new(axis: &Axis, x: f64) -> Result<Self, ApproximationError> {
+    pub(crate) fn new(axis: &Axis, x: f64) -> Result<Self, ApproximationError> {
         check(axis)?;
         axis.local(x).map(|s| Self::at(axis, s)).ok_or_else(|| outside(&[*axis], &[x]))
     }
 
     /// The position at `s` spacings from the origin, 0 … cells.
     #[inline(always)]
-    pub fn at(axis: &Axis, s: f64) -> Self {
+    pub(crate) fn at(axis: &Axis, s: f64) -> Self {
         let cell = (s as u32).min(axis.cells - 1);
         // This difference is exact: s and the cell number agree in their leading digits.
         let below = s - f64::from(cell);

@@ -82,7 +82,7 @@ impl Identity {
     }
 
     /// Adds the checksums of other files that the scene names, by key.
-    pub fn with_files(mut self, files: impl IntoIterator<Item = (String, u32)>) -> Self {
+    pub(crate) fn with_files(mut self, files: impl IntoIterator<Item = (String, u32)>) -> Self {
         self.start.extend(files);
         self
     }

@@ -213,7 +213,7 @@ impl Foreign {
     ///
     /// # Errors
     /// A sentence that says why the library cannot be used.
-    pub fn open(description: Description, symmetric: bool) -> Result<Self, CallFailed> {
+    pub(crate) fn open(description: Description, symmetric: bool) -> Result<Self, CallFailed> {
         let caller = open(&description)?;
         let signature = caller.signature().clone();
         let components: fn(f64) -> Components =

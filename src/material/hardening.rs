@@ -58,7 +58,7 @@ impl Hardening {
     }
 
     /// k'(p)
-    pub fn slope<T: Real>(&self, p: T) -> T {
+    pub(crate) fn slope<T: Real>(&self, p: T) -> T {
         T::lit(self.linear) + (p * T::lit(-self.rate)).exp() * T::lit(self.saturation * self.rate)
     }
 

@@ -44,7 +44,7 @@ pub(super) struct Strained<T: Real> {
 
 impl<T: Real> Strained<T> {
     /// From F and the six numbers of C_i⁻¹ − I. An empty list means C_i = I.
-    pub fn new<const D: usize>(at: &Deformation<T, D>, inverse_inelastic: &[f64]) -> Self {
+    pub(crate) fn new<const D: usize>(at: &Deformation<T, D>, inverse_inelastic: &[f64]) -> Self {
         let at = Deformation::new(embed(&at.h));
         let strain = function(&Hencky, &half_b_less_one(&at, inverse_inelastic));
         let volume = trace(&strain);
@@ -52,18 +52,18 @@ impl<T: Real> Strained<T> {
     }
 
     /// dev ε : dev ε
-    pub fn square(&self) -> T {
+    pub(crate) fn square(&self) -> T {
         contract(&self.deviator, &self.deviator)
     }
 
     /// ‖dev ε‖. Where it is zero, its derivatives are taken as zero.
-    pub fn norm(&self) -> T {
+    pub(crate) fn norm(&self) -> T {
         let square = self.square();
         if square.value() > 0.0 { square.sqrt() } else { T::zero() }
     }
 
     /// S = F⁻¹ τ F⁻ᵀ of τ = p I + g dev ε
-    pub fn stress<const D: usize>(&self, p: T, g: T) -> Tensor<T, D> {
+    pub(crate) fn stress<const D: usize>(&self, p: T, g: T) -> Tensor<T, D> {
         self.pulled_back(&(scaled(&identity(), p) + scaled(&self.deviator, g)))
     }
 
@@ -74,12 +74,12 @@ impl<T: Real> Strained<T> {
     }
 
     /// ε
-    pub fn strain(&self) -> Tensor<T, 3> {
+    pub(crate) fn strain(&self) -> Tensor<T, 3> {
         self.deviator + scaled(&identity(), self.volume * T::lit(1.0 / 3.0))
     }
 
     /// f(ε)
-    pub fn function(&self, f: &impl Function) -> Tensor<T, 3> {
+    pub(crate) fn function(&self, f: &impl Function) -> Tensor<T, 3> {
         function(f, &self.strain())
     }
 }
@@ -97,7 +97,7 @@ pub(super) struct Principal {
 
 impl Principal {
     /// From the arguments of [`Strained::new`].
-    pub fn new<const D: usize>(at: &Deformation<f64, D>, inverse_inelastic: &[f64]) -> Self {
+    pub(crate) fn new<const D: usize>(at: &Deformation<f64, D>, inverse_inelastic: &[f64]) -> Self {
         let at = Deformation::new(embed(&at.h));
         let half = half_b_less_one(&at, inverse_inelastic);
         let axes = principal_axes(&half);
@@ -107,18 +107,18 @@ impl Principal {
     }
 
     /// tr ε
-    pub fn volume(&self) -> f64 {
+    pub(crate) fn volume(&self) -> f64 {
         self.strains[0] + self.strains[1] + self.strains[2]
     }
 
     /// The principal values of dev ε.
-    pub fn deviator(&self) -> [f64; 3] {
+    pub(crate) fn deviator(&self) -> [f64; 3] {
         let mean = self.volume() * (1.0 / 3.0);
         self.strains.map(|strain| strain - mean)
     }
 
     /// ‖dev ε‖
-    pub fn norm(&self) -> f64 {
+    pub(crate) fn norm(&self) -> f64 {
         let [a, b, c] = self.deviator();
         (a * a + b * b + c * c).sqrt()
     }
@@ -127,7 +127,7 @@ impl Principal {
     ///
     /// With L = sym(F⁻ᵀ X F⁻¹), δb = L b + b L makes δεᵢⱼ = (Δ coth Δ) Lᵢⱼ with Δ = εᵢ − εⱼ, so that
     /// F (ℂ:X) Fᵀ = δτ − L τ − τ L is Σⱼ ∂τᵢ/∂εⱼ Lⱼⱼ − 2τᵢ Lᵢᵢ on the diagonal, and [(τᵢ − τⱼ) coth Δ − τᵢ − τⱼ] Lᵢⱼ off it.
-    pub fn moduli(&self, tau: [f64; 3], slopes: Tensor<f64, 3>, secant: impl Fn(usize, usize) -> f64) -> Moduli {
+    pub(crate) fn moduli(&self, tau: [f64; 3], slopes: Tensor<f64, 3>, secant: impl Fn(usize, usize) -> f64) -> Moduli {
         let mut normal = slopes;
         let mut shear = Tensor::zeros();
         for i in 0..3 {
@@ -153,7 +153,7 @@ impl Principal {
     }
 
     /// Writes the six numbers of C_i⁻¹ − I after a flow with the principal strains `flow`: C_i⁻¹ grows by F⁻¹ [b e^{−2Δε} − b] F⁻ᵀ.
-    pub fn flow(&self, flow: [f64; 3], inverse_inelastic: &[f64], next: &mut [f64]) {
+    pub(crate) fn flow(&self, flow: [f64; 3], inverse_inelastic: &[f64], next: &mut [f64]) {
         mutant!("laws: plastic flow of half the size": flow = flow.map(|flow| 0.5 * flow));
         let lost = Tensor::from_diagonal(&Vector::from_fn(|i, _| (1.0 + 2.0 * self.x[i]) * (-2.0 * flow[i]).exp_m1()));
         let back = self.at.inverse_transpose().transpose() * self.axes;
@@ -181,7 +181,7 @@ pub struct Radial<T> {
 
 impl<T: Real> Radial<T> {
     /// Hooke's law in ε: p = K v, g = 2G.
-    pub fn elastic(solid: &Lame, v: T) -> Self {
+    pub(crate) fn elastic(solid: &Lame, v: T) -> Self {
         let (bulk, twice_shear) = (T::lit(solid.bulk_modulus()), T::lit(2.0 * solid.shear));
         Self { p: bulk * v, g: twice_shear, p_v: bulk, p_d: T::zero(), t_v: T::zero(), t_d: twice_shear }
     }
@@ -208,7 +208,7 @@ impl Moduli {
     }
 
     /// ℂ:X
-    pub fn elasticity<const D: usize>(&self, x: &Tensor<f64, D>) -> Tensor<f64, D> {
+    pub(crate) fn elasticity<const D: usize>(&self, x: &Tensor<f64, D>) -> Tensor<f64, D> {
         let back = self.axes.transpose() * self.f_inv_t;
         let l = back * embed(&symmetric(x)) * back.transpose();
         cut(&(back.transpose() * self.response(&l) * back))

@@ -50,7 +50,7 @@ pub struct ReturnMapped<T> {
 
 impl<T: Real> ReturnMapped<T> {
     /// A step without plastic flow.
-    pub fn elastic(solid: &Lame, v: T, before: f64) -> Self {
+    pub(crate) fn elastic(solid: &Lame, v: T, before: f64) -> Self {
         Self { radial: Radial::elastic(solid, v), plastic_strain: T::lit(before), dissipated: T::zero() }
     }
 }

@@ -107,11 +107,11 @@ fn keyed<const D: usize>(particles: &Particles<D>, averages: &[bool], supports: 
 
 impl Cells {
     /// Upper bound of the bytes per particle.
-    pub const BYTES: usize =
+    pub(crate) const BYTES: usize =
         size_of::<Member>() + 2 * size_of::<u32>() + size_of::<f64>() + size_of::<u64>() + size_of::<Scale>();
 
     /// The cells of the bodies with mean dilatation; `None` if there is no such body.
-    pub fn of<const D: usize, L: Law>(
+    pub(crate) fn of<const D: usize, L: Law>(
         particles: &Particles<D>,
         bodies: &[Body<L>],
         supports: &Supports<D>,
@@ -160,25 +160,25 @@ impl Cells {
     }
 
     /// The members of every cell, with their total volume at the last grid reset.
-    pub fn iter(&self) -> impl Iterator<Item = (&[Member], f64)> {
+    pub(crate) fn iter(&self) -> impl Iterator<Item = (&[Member], f64)> {
         let ranges = self.starts.windows(2).map(|ends| ends[0] as usize..ends[1] as usize);
         ranges.map(|range| &self.members[range]).zip(self.volumes.iter().copied())
     }
 
     /// For every cell, the sum of the numbers of its members. `of_slots` has the numbers by group and lane.
-    pub fn sums(&self, of_slots: &[[f64; LANES]]) -> Vec<f64> {
+    pub(crate) fn sums(&self, of_slots: &[[f64; LANES]]) -> Vec<f64> {
         let number = |slot: usize| of_slots[slot / LANES][slot % LANES];
         self.iter().map(|(members, _)| members.iter().map(|member| number(member.slot as usize)).sum()).collect()
     }
 
     /// The cell of a particle, if it has one.
     #[inline(always)]
-    pub fn cell(&self, particle: u32) -> Option<usize> {
+    pub(crate) fn cell(&self, particle: u32) -> Option<usize> {
         Some(self.of[particle as usize]).filter(|&cell| cell != NONE).map(|cell| cell as usize)
     }
 
     /// Θ − 1 of every cell after the nodal motion since the last grid reset; 0 in a cell that is turned inside out.
-    pub fn changes<T: Number, const D: usize>(
+    pub(crate) fn changes<T: Number, const D: usize>(
         &self,
         particles: &Particles<D>,
         supports: &Supports<D>,
@@ -197,7 +197,7 @@ impl Cells {
 
 impl Cells {
     /// Θ − 1 of every cell: that of its own unknown, if it has one, or that of the motion.
-    pub fn changes_at<T: Number, const D: usize>(
+    pub(crate) fn changes_at<T: Number, const D: usize>(
         &self,
         particles: &Particles<D>,
         supports: &Supports<D>,
@@ -211,7 +211,7 @@ impl Cells {
     }
 
     /// Θ − 1 of every cell from the present θ of its particles.
-    pub fn changes_now<const D: usize>(&self, particles: &Particles<D>) -> Vec<f64> {
+    pub(crate) fn changes_now<const D: usize>(&self, particles: &Particles<D>) -> Vec<f64> {
         let reference = particles.reference();
         let of = |(members, _): (&[Member], f64)| {
             let p = members[0].particle as usize;
@@ -222,7 +222,7 @@ impl Cells {
     }
 
     /// The unknowns of the cells from the present θ of their particles.
-    pub fn unknowns<const D: usize>(&self, particles: &Particles<D>) -> Vec<f64> {
+    pub(crate) fn unknowns<const D: usize>(&self, particles: &Particles<D>) -> Vec<f64> {
         self.changes_now(particles).iter().zip(&self.scales).map(|(change, scale)| change / scale.dilatation).collect()
     }
 }

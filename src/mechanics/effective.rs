@@ -21,7 +21,7 @@ impl<const D: usize> Function<D> {
 
 impl<const D: usize> Space<D> {
     /// The effective shape functions at a particle, with their nodes.
-    pub fn functions(&self, supports: &Supports<D>, particle: usize) -> Vec<(usize, Function<D>)> {
+    pub(crate) fn functions(&self, supports: &Supports<D>, particle: usize) -> Vec<(usize, Function<D>)> {
         let mut all: Vec<_> =
             supports.of(particle).map(|(node, n, grad_n)| (node, Function::of_all(n, grad_n))).collect();
         for (node, n, grad_n) in supports.of(particle) {
@@ -43,7 +43,7 @@ impl<const D: usize> Space<D> {
     }
 
     /// For each particle, whether an outer node supports it.
-    pub fn reached(&self, supports: &Supports<D>) -> Vec<bool> {
+    pub(crate) fn reached(&self, supports: &Supports<D>) -> Vec<bool> {
         let mut outer: Pooled<Vector<f64, D>> = supports.field();
         self.followers().rows().for_each(|(node, ..)| outer[node].fill(1.0));
         supports.evaluate(&outer, |_, n, grad_n| n.iter().chain(&grad_n).any(|x| *x != 0.0))

@@ -52,12 +52,12 @@ pub(crate) struct Kinematics<'a, const D: usize>(pub &'a Particles<D>);
 
 impl<'a, const D: usize> Kinematics<'a, D> {
     /// H of particle p at L = `l`.
-    pub fn displacement_gradient<T: Real>(self, p: usize, l: &Tensor<T, D>) -> Tensor<T, D> {
+    pub(crate) fn displacement_gradient<T: Real>(self, p: usize, l: &Tensor<T, D>) -> Tensor<T, D> {
         compose(l, &self.0.reference().displacement_gradient[p])
     }
 
     /// F_r of particle p.
-    pub fn reference(self, p: usize) -> Tensor<f64, D> {
+    pub(crate) fn reference(self, p: usize) -> Tensor<f64, D> {
         identity::<f64, D>() + self.0.reference().displacement_gradient[p]
     }
 
@@ -65,13 +65,18 @@ impl<'a, const D: usize> Kinematics<'a, D> {
     ///
     /// # Errors
     /// det F ≤ 0
-    pub fn state<T: Real>(self, p: usize, l: &Tensor<T, D>, dt: f64) -> Result<MaterialState<'a, T, D>, Inadmissible> {
+    pub(crate) fn state<T: Real>(
+        self,
+        p: usize,
+        l: &Tensor<T, D>,
+        dt: f64,
+    ) -> Result<MaterialState<'a, T, D>, Inadmissible> {
         let at = self.0.state(p, dt).deformed(self.displacement_gradient(p, l)).admissible();
         at.map_err(|source| Inadmissible { particle: self.0.id[p] as usize, source })
     }
 
     /// V₀ P F_rᵀ of particle p.
-    pub fn to_nodes<T: Real>(self, p: usize, piola: &Tensor<T, D>) -> Tensor<T, D> {
+    pub(crate) fn to_nodes<T: Real>(self, p: usize, piola: &Tensor<T, D>) -> Tensor<T, D> {
         to_nodes(piola, &self.reference(p), self.0.volume[p])
     }
 }

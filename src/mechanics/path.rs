@@ -74,7 +74,7 @@ impl<'a, const D: usize, L: Law> OnPath<'a, D, L> {
     ///
     /// # Errors
     /// det F ≤ 0 at the start.
-    pub fn new(
+    pub(crate) fn new(
         path: Path,
         start: &'a Equilibrium<'a, D, L>,
         force: &'a dyn Fn(f64) -> Result<Pooled<Vector<f64, D>>, Inadmissible>,
@@ -93,13 +93,13 @@ impl<'a, const D: usize, L: Law> OnPath<'a, D, L> {
     }
 
     /// λ(φ) = λ_n + (Δs − d·(φ − φ_n))/w
-    pub fn load(&self, phi: &[Vector<f64, D>]) -> f64 {
+    pub(crate) fn load(&self, phi: &[Vector<f64, D>]) -> f64 {
         let along: f64 = self.moved(phi).map(|(moved, d)| d.dot(&moved)).sum();
         self.path.load + (self.length - along) / self.path.weight
     }
 
     /// The cosine of the angle between φ − φ_n and d; 1 where nothing moves.
-    pub fn cosine(&self, phi: &[Vector<f64, D>]) -> f64 {
+    pub(crate) fn cosine(&self, phi: &[Vector<f64, D>]) -> f64 {
         let (mut along, mut squares) = (0.0, 0.0);
         for (moved, d) in self.moved(phi) {
             along += d.dot(&moved);
@@ -118,7 +118,7 @@ impl<'a, const D: usize, L: Law> OnPath<'a, D, L> {
     }
 
     /// Whether f′(λ) = 0: the loads no longer change, and the path ends.
-    pub fn ends(&self, load: f64) -> Result<bool, Inadmissible> {
+    pub(crate) fn ends(&self, load: f64) -> Result<bool, Inadmissible> {
         Ok(self.slope(load)?.iter().all(|slope| slope.norm() == 0.0))
     }
 }

@@ -196,10 +196,6 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
     ///
     /// # Errors
     /// See [`Self::residual`].
-    pub fn sensitivity(&self, phi: &[Vector<f64, D>]) -> Result<f64, Inadmissible> {
-        self.sensitivity_at(Trial::motion(phi))
-    }
-
     pub(crate) fn sensitivity_at(&self, at: Trial<'_, f64, D>) -> Result<f64, Inadmissible> {
         let mut out = self.magnitudes(at)?;
         self.terms.add_sensitivity(&self.space.extended(at.phi), &mut out)?;

@@ -25,7 +25,7 @@ pub(crate) struct Unsymmetric {
 
 impl Unsymmetric {
     /// The parts that loads and laws decide.
-    pub fn of<const D: usize, L: Law>(bodies: &[Body<L>], loads: &Loads<D>) -> Self {
+    pub(crate) fn of<const D: usize, L: Law>(bodies: &[Body<L>], loads: &Loads<D>) -> Self {
         Self {
             pressure: loads.surface.iter().any(|load| matches!(load.pressing, Pressing::Pressure(_))),
             friction: loads.contacts.have_friction(),
@@ -36,7 +36,7 @@ impl Unsymmetric {
     }
 
     /// The reason; `None` if the tangent is symmetric.
-    pub fn reason(self) -> Option<&'static str> {
+    pub(crate) fn reason(self) -> Option<&'static str> {
         let reasons = [
             (self.path, "on a path of equilibria, the load is unknown too"),
             (self.mean_stress, "the mean stress of a step makes the tangent unsymmetric"),

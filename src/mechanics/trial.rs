@@ -22,7 +22,7 @@ impl<T, const D: usize> Copy for Trial<'_, T, D> {}
 
 impl<'x, T, const D: usize> Trial<'x, T, D> {
     /// A motion that determines the dilatation of the cells.
-    pub fn motion(phi: &'x [Vector<T, D>]) -> Self {
+    pub(crate) fn motion(phi: &'x [Vector<T, D>]) -> Self {
         Self { phi, dilatation: &[] }
     }
 }

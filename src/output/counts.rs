@@ -142,7 +142,7 @@ impl Seconds {
     }
 
     /// Adds the phases of attempts that failed.
-    pub fn add_failed(&mut self, attempts: &[FailedAttempt]) {
+    pub(crate) fn add_failed(&mut self, attempts: &[FailedAttempt]) {
         attempts.iter().for_each(|attempt| self.add_phases(&attempt.seconds));
     }
 

@@ -22,7 +22,7 @@ impl Cause {
     const ALL: [Self; 5] = [Self::Obstacle, Self::Wall, Self::Bodies, Self::NewGrid, Self::Step];
 
     /// The cause of losses in a step.
-    pub fn of(touches: bool, feels_wall: bool, shares: bool, renewed: bool) -> Self {
+    pub(crate) fn of(touches: bool, feels_wall: bool, shares: bool, renewed: bool) -> Self {
         match (touches, feels_wall, shares, renewed) {
             (true, ..) => Self::Obstacle,
             (_, true, ..) => Self::Wall,
@@ -85,7 +85,7 @@ pub(crate) struct Losses {
 
 impl Losses {
     /// Adds a step.
-    pub fn add(&mut self, energies: &Energies, cause: Cause) {
+    pub(crate) fn add(&mut self, energies: &Energies, cause: Cause) {
         let Energies { kinetic, strain, dissipated, balance, .. } = *energies;
         let energy = kinetic.abs() + strain.abs() + dissipated.abs();
         if energy.is_finite() && balance.is_finite() {
@@ -97,17 +97,17 @@ impl Losses {
     }
 
     /// The lowest and the highest balance so far, as fractions of the largest energy.
-    pub fn range(&self) -> [f64; 2] {
+    pub(crate) fn range(&self) -> [f64; 2] {
         self.range.map(|balance| if self.largest > 0.0 { balance / self.largest } else { 0.0 })
     }
 
     /// The loss as a fraction of the largest energy so far.
-    pub fn part(&self) -> f64 {
+    pub(crate) fn part(&self) -> f64 {
         if self.largest > 0.0 { -self.balance / self.largest } else { 0.0 }
     }
 
     /// A message with the loss, its causes and a cure. `lumped`: whether the mass matrix is lumped in full.
-    pub fn says(&self, lumped: bool) -> String {
+    pub(crate) fn says(&self, lumped: bool) -> String {
         let lost: f64 = self.by_cause.iter().filter(|&&lost| lost > 0.0).sum();
         let mut causes: Vec<_> =
             Cause::ALL.into_iter().zip(self.by_cause).filter(|(_, by)| *by > 0.05 * lost).collect();

@@ -61,13 +61,13 @@ impl Mark {
     ///
     /// # Errors
     /// A file is missing, shorter, or has other content.
-    pub fn check(&self, directory: &Path) -> Result<(), OutputError> {
+    pub(crate) fn check(&self, directory: &Path) -> Result<(), OutputError> {
         self.files.iter().try_for_each(|(name, written)| written.check(&directory.join(name)))?;
         self.snapshots.map_or(Ok(()), |snapshots| snapshots.check(directory))
     }
 
     /// Snapshots that were written before the mark and are missing in `directory` now. A continued run does not need them.
-    pub fn missing(&self, directory: &Path) -> Vec<PathBuf> {
+    pub(crate) fn missing(&self, directory: &Path) -> Vec<PathBuf> {
         self.snapshots.map_or_else(Vec::new, |snapshots| snapshots.missing(directory))
     }
 }

@@ -32,7 +32,7 @@ pub(crate) struct MovedOutlines<const D: usize>(Vec<Line<D>>);
 
 impl<const D: usize> MovedOutlines<D> {
     /// The outlines of the bodies of `particles`; `None` if they have none, or need none.
-    pub fn of(particles: &Particles<D>, reference: &Reference<D>, spacing: f64) -> Option<Self> {
+    pub(crate) fn of(particles: &Particles<D>, reference: &Reference<D>, spacing: f64) -> Option<Self> {
         let solid: Vec<usize> = (0..particles.len()).filter(|&p| particles.is_solid(p)).collect();
         if particles.outlines.is_empty() || solid.len() > MAX_CELLS {
             return None;
@@ -52,7 +52,7 @@ impl<const D: usize> MovedOutlines<D> {
     }
 
     /// The outlines at the time of the snapshot `snapshot`, as segments in the order of the lines.
-    pub fn at(&self, particles: &Particles<D>, snapshot: &Snapshot) -> Snapshot {
+    pub(crate) fn at(&self, particles: &Particles<D>, snapshot: &Snapshot) -> Snapshot {
         let places = particles.places();
         let (mut points, mut bodies) = (Vec::new(), Vec::new());
         for line in &self.0 {

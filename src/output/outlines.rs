@@ -15,12 +15,12 @@ pub(crate) struct Outlines<const D: usize>(Vec<Vec<Vector<f64, D>>>);
 
 impl<const D: usize> Outlines<D> {
     /// The outlines of all obstacles. Unbounded obstacles end at the grid.
-    pub fn of(contacts: &Contacts<D>, grid: &Grid<D>) -> Self {
+    pub(crate) fn of(contacts: &Contacts<D>, grid: &Grid<D>) -> Self {
         Self(contacts.obstacles.iter().map(|obstacle| outline(obstacle, grid)).collect())
     }
 
     /// The outlines in the poses of a time, with the number of the obstacle of each corner.
-    pub fn at(&self, contacts: &Contacts<D>, time: f64, particles: &Snapshot) -> Snapshot {
+    pub(crate) fn at(&self, contacts: &Contacts<D>, time: f64, particles: &Snapshot) -> Snapshot {
         let (mut points, mut numbers) = (Vec::new(), Vec::new());
         for (number, (obstacle, corners)) in contacts.obstacles.iter().zip(&self.0).enumerate() {
             let pose = obstacle.pose(time);

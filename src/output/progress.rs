@@ -52,7 +52,7 @@ fn line(text: &str) {
 
 impl Progress {
     /// Starts now, at simulated time `start`, towards `end`.
-    pub fn new(start: f64, end: f64, audience: Audience) -> Self {
+    pub(crate) fn new(start: f64, end: f64, audience: Audience) -> Self {
         let since = Instant::now();
         let bar = ProgressBar::new(BAR_LENGTH as u64);
         if audience != Audience::Person {
@@ -68,7 +68,7 @@ impl Progress {
     }
 
     /// Shows that `time` is reached, with the energy `balance` so far, gained (> 0) or lost; `None` without inertia.
-    pub fn show(&mut self, time: f64, step: u64, cost: &Cost, balance: Option<f64>) {
+    pub(crate) fn show(&mut self, time: f64, step: u64, cost: &Cost, balance: Option<f64>) {
         let (Cost { newton, krylov, .. }, end) = (*cost, self.end);
         self.bar.set_position((BAR_LENGTH * (time - self.start) / (end - self.start)) as u64);
         let left = (self.bar.per_sec() > 0.0).then(|| self.bar.eta());
@@ -115,7 +115,7 @@ impl Progress {
     }
 
     /// Removes the bar, or shows the line that was held back.
-    pub fn finish(self) {
+    pub(crate) fn finish(self) {
         self.bar.finish_and_clear();
         self.held.iter().for_each(|text| line(text));
     }

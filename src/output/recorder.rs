@@ -102,7 +102,7 @@ impl<const D: usize> Recorder<D> {
     /// Example: [`Mark`].
     ///
     /// # Errors
-    /// The errors of [`Self::start`] and of [`Mark::check`].
+    /// The errors of [`Self::start`] and those of a mark that does not fit the files.
     pub fn resume<L: Law, A: ShapeFunction>(
         settings: OutputSettings<D>,
         simulation: &Simulation<D, L, A>,
@@ -189,7 +189,7 @@ impl<const D: usize> Recorder<D> {
     }
 
     /// Adds the seconds in which the simulation was built, before the recorder started.
-    pub fn count_set_up(&mut self, seconds: f64) {
+    pub(crate) fn count_set_up(&mut self, seconds: f64) {
         self.so_far.seconds.set_up += seconds;
         self.so_far.seconds.total += seconds;
     }

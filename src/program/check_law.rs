@@ -16,7 +16,7 @@ pub struct CheckLaw {
 
 impl CheckLaw {
     /// Checks the law and writes the reports.
-    pub fn execute(self) -> Result<(), Failure> {
+    pub(crate) fn execute(self) -> Result<(), Failure> {
         let host = Host::this_program().map_err(Failure::scene)?;
         match tangent_check::program::run("bfree check-law", self.arguments, host) {
             0 => Ok(()),

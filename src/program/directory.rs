@@ -9,7 +9,7 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 /// The directory given by `--out`, or `out/` and the name of the scene.
-pub fn of_results(out: Option<&Path>, scene: &Path) -> Result<PathBuf, Failure> {
+pub(crate) fn of_results(out: Option<&Path>, scene: &Path) -> Result<PathBuf, Failure> {
     if let Some(out) = out {
         return Ok(out.to_owned());
     }

@@ -14,19 +14,19 @@ pub enum Failure {
 }
 
 /// Exit code after Ctrl-C: 128 plus the number of the signal.
-pub const INTERRUPTED: u8 = 130;
+pub(crate) const INTERRUPTED: u8 = 130;
 
 impl Failure {
-    pub fn scene(error: impl Into<Box<dyn Error>>) -> Self {
+    pub(crate) fn scene(error: impl Into<Box<dyn Error>>) -> Self {
         Self::Scene(error.into())
     }
 
-    pub fn run(error: impl Into<Box<dyn Error>>) -> Self {
+    pub(crate) fn run(error: impl Into<Box<dyn Error>>) -> Self {
         Self::Run(error.into())
     }
 
     /// The operating system refuses to do `what`, such as `write a.json`.
-    pub fn system(what: impl Display) -> impl Fn(std::io::Error) -> Self {
+    pub(crate) fn system(what: impl Display) -> impl Fn(std::io::Error) -> Self {
         let what = what.to_string();
         move |source| Self::run(Refused { what: what.clone(), source })
     }

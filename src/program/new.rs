@@ -46,7 +46,7 @@ pub struct New {
 
 impl New {
     /// Writes the scene of the problem, or prints the list of problems.
-    pub fn execute(&self) -> Result<(), Failure> {
+    pub(crate) fn execute(&self) -> Result<(), Failure> {
         let Some((name, text)) = PROBLEMS.iter().find(|(name, _)| Some(*name) == self.problem.as_deref()) else {
             return print(list());
         };

@@ -115,7 +115,7 @@ struct Unwritable {
 
 impl Newton {
     /// Takes the steps and prints their residuals.
-    pub fn execute(&self) -> Result<(), Failure> {
+    pub(crate) fn execute(&self) -> Result<(), Failure> {
         let scene = self.scene.read()?;
         match scene.dimension() {
             1 => self.execute_in::<1>(&scene),

@@ -19,7 +19,7 @@ pub struct Bound<const D: usize> {
 
 impl<const D: usize> Bound<D> {
     /// A warning if the nearest particle is farther away than the particle spacing.
-    pub fn warning(&self) -> Option<String> {
+    pub(crate) fn warning(&self) -> Option<String> {
         (self.distance > self.spacing).then(|| {
             let consequence = match self.probe.place {
                 Place::Particle(_) | Place::Carried { .. } => "it is followed all the same",
@@ -33,7 +33,7 @@ impl<const D: usize> Bound<D> {
     }
 
     /// The entry of the probe in the report.
-    pub fn report(&self) -> Value {
+    pub(crate) fn report(&self) -> Value {
         json!({"name": self.probe.name, "particle": self.particle, "distance": self.distance, "warning": self.warning()})
     }
 }

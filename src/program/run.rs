@@ -85,12 +85,12 @@ enum Form {
 
 impl Run {
     /// Whether messages are written as JSON, for a program.
-    pub fn tells_json(&self) -> bool {
+    pub(crate) fn tells_json(&self) -> bool {
         self.progress == Form::Json
     }
 
     /// Runs the scene.
-    pub fn execute(&self) -> Result<(), Failure> {
+    pub(crate) fn execute(&self) -> Result<(), Failure> {
         let start = Instant::now();
         let mut scene = self.scene.read()?;
         if let Some(until) = self.until {

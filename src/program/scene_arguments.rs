@@ -35,7 +35,7 @@ struct Unusable {
 
 impl SceneArguments {
     /// Reads the scene, applies the overrides and validates the result.
-    pub fn read(&self) -> Result<Scene, Failure> {
+    pub(crate) fn read(&self) -> Result<Scene, Failure> {
         self.libraries.iter().for_each(|path| allow_library(path));
         let overrides: Result<Vec<Override>, _> = self.overrides.iter().map(|text| text.parse()).collect();
         scene::read_file(&self.scene, &overrides.map_err(Failure::scene)?).map_err(|error| match error {
@@ -46,19 +46,19 @@ impl SceneArguments {
     }
 
     /// Adds the path of the scene to an error.
-    pub fn unusable(&self, error: impl Error + 'static) -> Failure {
+    pub(crate) fn unusable(&self, error: impl Error + 'static) -> Failure {
         Failure::scene(Unusable { path: self.scene.clone(), source: Box::new(error) })
     }
 
     /// Builds the simulation at t = 0. Too little memory for its particles is an error.
-    pub fn build<const D: usize>(&self, scene: &Scene) -> Result<Simulation<D>, Failure> {
+    pub(crate) fn build<const D: usize>(&self, scene: &Scene) -> Result<Simulation<D>, Failure> {
         let memory = memory::available().unwrap_or(u64::MAX);
         let folder = self.scene.parent().unwrap_or(Path::new("."));
         scene.build_within::<D>(folder, memory).map_err(|error| self.unusable(error))
     }
 
     /// The plan of a run: its terms and arrays. Too little memory for the arrays is an error.
-    pub fn plan<const D: usize>(&self, simulation: &Simulation<D>) -> Result<Plan, Failure> {
+    pub(crate) fn plan<const D: usize>(&self, simulation: &Simulation<D>) -> Result<Plan, Failure> {
         let plan = Plan::of(simulation).map_err(|error| self.unusable(error))?;
         // The particles are allocated already, but the plan counts them again.
         let particles = (simulation.particles.len() * Particles::<D>::BYTES) as u64;
@@ -68,7 +68,7 @@ impl SceneArguments {
     }
 
     /// Runs `bfree check`: prints the particles, plan, output and probes of the scene.
-    pub fn check(&self) -> Result<(), Failure> {
+    pub(crate) fn check(&self) -> Result<(), Failure> {
         let scene = self.read()?;
         match scene.dimension() {
             1 => self.check_in::<1>(&scene),

@@ -20,7 +20,7 @@ pub(crate) struct Schedule {
 
 impl Schedule {
     /// The steps until `end`, at most `most` of them. The shortened step counts as one.
-    pub fn new(clock: &Clock, end: f64, most: Option<u64>) -> Self {
+    pub(crate) fn new(clock: &Clock, end: f64, most: Option<u64>) -> Self {
         let until_end = clock.whole_steps(end);
         Self {
             end,
@@ -30,7 +30,7 @@ impl Schedule {
     }
 
     /// The time after the last step.
-    pub fn end_time(&self, clock: &Clock) -> f64 {
+    pub(crate) fn end_time(&self, clock: &Clock) -> f64 {
         if self.shortens { self.end } else { self.whole_steps as f64 * clock.nominal() }
     }
 
@@ -69,7 +69,7 @@ impl<const D: usize> Steps<D> {
     ///
     /// # Errors
     /// The results cannot be written.
-    pub fn take(&mut self) -> Result<Option<AdvanceError>, Box<dyn Error>> {
+    pub(crate) fn take(&mut self) -> Result<Option<AdvanceError>, Box<dyn Error>> {
         loop {
             if let Some(checkpoints) = &mut self.checkpoints {
                 checkpoints.write_if_due(&self.simulation, &mut self.recorder)?;

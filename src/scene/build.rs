@@ -150,7 +150,7 @@ impl Scene {
     }
 
     /// The checksums of the files of curves that [`Self::build`] has read, by key.
-    pub fn curve_files(&self) -> impl Iterator<Item = (String, u32)> {
+    pub(crate) fn curve_files(&self) -> impl Iterator<Item = (String, u32)> {
         self.curves().into_iter().filter_map(|(path, curve)| Some((format!("{path}.file"), curve.checksum()?)))
     }
 

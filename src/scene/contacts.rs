@@ -135,7 +135,7 @@ impl<const D: usize> Builder<'_, D> {
     }
 
     /// Refuses bodies that start in an obstacle, and a free obstacle and another one that start in each other.
-    pub fn refuse_overlap(&self, contacts: &Contacts<D>) -> Result<(), BuildError> {
+    pub(crate) fn refuse_overlap(&self, contacts: &Contacts<D>) -> Result<(), BuildError> {
         let obstacles = &contacts.obstacles;
         let inside = |([_, other], x): &([usize; 2], &Vector<f64, D>)| obstacles[*other].shape.signed_distance(x) < 0.0;
         if let Some(([one, other], x)) = contacts.apart().find(inside) {
@@ -174,7 +174,7 @@ impl<const D: usize> Builder<'_, D> {
     }
 
     /// Refuses bodies that start in each other, where they may touch.
-    pub fn refuse_overlapping_bodies(&self, contacts: &Contacts<D>) -> Result<(), BuildError> {
+    pub(crate) fn refuse_overlapping_bodies(&self, contacts: &Contacts<D>) -> Result<(), BuildError> {
         let Some(between) = &contacts.between else { return Ok(()) };
         let regions = self.regions();
         for pair in &between.pairs {

@@ -60,7 +60,7 @@ pub(super) struct Builder<'a, const D: usize> {
 impl<const D: usize> Builder<'_, D> {
     /// Reserves room for `more` particles. A step stores the state at its start and at its end. Shape functions and the linearised tangent
     /// need more memory than a state, so three states are a lower bound. The exact amount is known only once the shape functions are.
-    pub fn make_room(&mut self, path: &str, more: usize) -> Result<(), BuildError> {
+    pub(crate) fn make_room(&mut self, path: &str, more: usize) -> Result<(), BuildError> {
         let count = self.particles.len() + more;
         let needed = 3 * (count * Particles::<D>::BYTES) as u64;
         if needed > self.memory {
@@ -76,7 +76,7 @@ impl<const D: usize> Builder<'_, D> {
     }
 
     /// Appends a particle. Without inertia, particles have no velocities.
-    pub fn push(&mut self, x: Vector<f64, D>, velocity: Vector<f64, D>, volume: f64, mass: f64, body: usize) {
+    pub(crate) fn push(&mut self, x: Vector<f64, D>, velocity: Vector<f64, D>, volume: f64, mass: f64, body: usize) {
         if self.scene.time.scheme().has_inertia() {
             self.particles.push(x, velocity, volume, mass, body as u32);
         } else {
@@ -91,7 +91,7 @@ impl<const D: usize> Builder<'_, D> {
     }
 
     /// Appends the particles of body `number`.
-    pub fn fill(&mut self, number: usize, body: &Body) -> Result<(), BuildError> {
+    pub(crate) fn fill(&mut self, number: usize, body: &Body) -> Result<(), BuildError> {
         let common = body.velocity.as_ref().map(|v| vector::<D>(v));
         if let Some(shape) = &body.shape {
             let path = format!("bodies[{number}].shape");
@@ -130,7 +130,7 @@ impl<const D: usize> Builder<'_, D> {
 
     /// The surface of a body as facets, one by one for the boxes of a cut cell. Faces of the grid's box that hold the normal component are
     /// planes of symmetry, and not part of the surface.
-    pub fn facets(
+    pub(crate) fn facets(
         &self,
         body: &Body,
         shape: &Shape<D>,
@@ -168,7 +168,7 @@ impl<const D: usize> Builder<'_, D> {
     }
 
     /// The surface of a body from a file. Bodies of the same nodal field are joined to it.
-    pub fn cloud(&self, number: usize) -> Result<Vec<CloudPoint<D>>, BuildError> {
+    pub(crate) fn cloud(&self, number: usize) -> Result<Vec<CloudPoint<D>>, BuildError> {
         let (particles, fields) = (&self.particles, self.scene.nodal_fields());
         let body = |p: usize| particles.body[p] as usize;
         let solid = || (0..particles.len()).filter(|&p| particles.is_solid(p));

@@ -26,7 +26,7 @@ impl Scene {
 
 impl<const D: usize> Builder<'_, D> {
     /// Builds all loads. Points of loaded surfaces become particles without mass.
-    pub fn loads(&mut self) -> Result<Loads<D>, BuildError> {
+    pub(crate) fn loads(&mut self) -> Result<Loads<D>, BuildError> {
         let scene = self.scene;
         let mut loads = Loads { damping: scene.damping, ..Loads::default() };
         if let Some(gravity) = &scene.gravity {

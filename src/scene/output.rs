@@ -125,7 +125,7 @@ impl Output {
 
 impl Probe {
     /// The index of the only component to write.
-    pub fn component(&self) -> Option<usize> {
+    pub(crate) fn component(&self) -> Option<usize> {
         let component = self.component.as_ref()?;
         self.field.kind().components().iter().position(|one| one == component)
     }

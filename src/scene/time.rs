@@ -10,7 +10,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Maximum number of time steps of one run.
-pub const MAX_STEPS: f64 = 1e9;
+pub(crate) const MAX_STEPS: f64 = 1e9;
 
 /// The time steps and Newmark's constants.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]

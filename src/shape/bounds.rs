@@ -8,23 +8,23 @@ pub struct Bounds<const D: usize>(pub Vector<f64, D>, pub Vector<f64, D>);
 
 impl<const D: usize> Bounds<D> {
     /// The bounds of some points.
-    pub fn of(points: impl Iterator<Item = Vector<f64, D>>) -> Self {
+    pub(crate) fn of(points: impl Iterator<Item = Vector<f64, D>>) -> Self {
         Self::around(points.map(|x| Self(x, x)))
     }
 
     /// The bounds of some boxes.
-    pub fn around(boxes: impl Iterator<Item = Self>) -> Self {
+    pub(crate) fn around(boxes: impl Iterator<Item = Self>) -> Self {
         let nothing = Self(Vector::repeat(f64::INFINITY), Vector::repeat(f64::NEG_INFINITY));
         boxes.fold(nothing, |all, one| Self(all.0.inf(&one.0), all.1.sup(&one.1)))
     }
 
     /// Whether two boxes have a point in common.
-    pub fn meets(&self, other: &Self) -> bool {
+    pub(crate) fn meets(&self, other: &Self) -> bool {
         (0..D).all(|k| self.0[k] <= other.1[k] && other.0[k] <= self.1[k])
     }
 
     /// The squared distance of a point from the box, 0 inside.
-    pub fn squared_distance(&self, x: &Vector<f64, D>) -> f64 {
+    pub(crate) fn squared_distance(&self, x: &Vector<f64, D>) -> f64 {
         (x - x.sup(&self.0).inf(&self.1)).norm_squared()
     }
 }

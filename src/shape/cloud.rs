@@ -56,13 +56,13 @@ pub(crate) struct Cloud<const D: usize> {
 }
 
 impl<const D: usize> Cloud<D> {
-    pub fn new(particles: Vec<CloudParticle<D>>) -> Self {
+    pub(crate) fn new(particles: Vec<CloudParticle<D>>) -> Self {
         let near = Near::new(&particles, RADIUS * edge(&particles));
         Self { particles, near }
     }
 
     /// Whether `x` lies in the cloud.
-    pub fn holds(&self, x: &Vector<f64, D>) -> bool {
+    pub(crate) fn holds(&self, x: &Vector<f64, D>) -> bool {
         self.near.sum(&self.particles, x).0 > 0.5
     }
 }

@@ -17,7 +17,7 @@ pub struct GridBox<const D: usize> {
 
 impl<const D: usize> GridBox<D> {
     /// A cell of a grid.
-    pub fn cell(grid: &Grid<D>, index: [u32; D]) -> Self {
+    pub(crate) fn cell(grid: &Grid<D>, index: [u32; D]) -> Self {
         Self { lower: grid.position(index), edges: Vector::repeat(grid.spacing), spacing: grid.spacing }
     }
 

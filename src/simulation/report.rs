@@ -107,7 +107,7 @@ pub(super) struct Spent {
 }
 
 impl Spent {
-    pub fn nothing() -> Self {
+    pub(crate) fn nothing() -> Self {
         Self { watch: Stopwatch::start(), projection_iterations: 0 }
     }
 }

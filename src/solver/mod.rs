@@ -352,7 +352,7 @@ pub(crate) mod testing {
     pub struct Dense(pub Vec<Vec<f64>>);
 
     impl Dense {
-        pub fn from_fn(n: usize, entry: impl Fn(usize, usize) -> f64) -> Self {
+        pub(crate) fn from_fn(n: usize, entry: impl Fn(usize, usize) -> f64) -> Self {
             Self((0..n).map(|i| (0..n).map(|j| entry(i, j)).collect()).collect())
         }
 
@@ -363,7 +363,7 @@ pub(crate) mod testing {
             inverse
         }
 
-        pub fn times(&self, x: &[f64]) -> Vec<f64> {
+        pub(crate) fn times(&self, x: &[f64]) -> Vec<f64> {
             self.0.iter().map(|row| row.iter().zip(x).map(|(a, x)| a * x).sum()).collect()
         }
     }
@@ -381,13 +381,13 @@ pub(crate) mod testing {
     }
 
     /// ‖a − b‖∞
-    pub fn distance(a: &[f64], b: &[f64]) -> f64 {
+    pub(crate) fn distance(a: &[f64], b: &[f64]) -> f64 {
         assert_eq!(a.len(), b.len());
         a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
     }
 
     /// A fixed vector without pattern, entries in (−1, 1): the golden-ratio sequence.
-    pub fn irregular(n: usize) -> Vec<f64> {
+    pub(crate) fn irregular(n: usize) -> Vec<f64> {
         (1..=n).map(|i| 2.0 * (i as f64 * 0.618_033_988_749_894_9).fract() - 1.0).collect()
     }
 }

@@ -45,12 +45,12 @@ impl<const D: usize> Followers<D> {
     }
 
     /// Whether every node is an unknown.
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.extension.is_empty()
     }
 
     /// For each outer node: the components that follow, and the inner nodes with their weights.
-    pub fn rows(&self) -> impl Iterator<Item = (usize, [bool; D], impl Iterator<Item = (usize, f64)>)> {
+    pub(crate) fn rows(&self) -> impl Iterator<Item = (usize, [bool; D], impl Iterator<Item = (usize, f64)>)> {
         self.extension.rows().zip(&self.follows).map(|((outer, leaders), follows)| (outer, *follows, leaders))
     }
 

@@ -35,45 +35,45 @@ pub(crate) struct Space<const D: usize> {
 }
 
 impl<const D: usize> Space<D> {
-    pub fn new(nodes: usize, extension: Arc<Extension>, prescribed: Vec<(usize, usize)>, pool: &Pool) -> Self {
+    pub(crate) fn new(nodes: usize, extension: Arc<Extension>, prescribed: Vec<(usize, usize)>, pool: &Pool) -> Self {
         let followers = Followers::new(extension, prescribed.iter().copied());
         Self { nodes, prescribed, followers, pool: pool.clone() }
     }
 
     /// Number of entries of a field of vectors.
-    pub fn entries(&self) -> usize {
+    pub(crate) fn entries(&self) -> usize {
         D * self.nodes
     }
 
     /// Number of unknowns.
-    pub fn unknowns(&self) -> usize {
+    pub(crate) fn unknowns(&self) -> usize {
         let following: usize =
             self.followers.rows().map(|(_, follows, _)| follows.iter().filter(|one| **one).count()).sum();
         self.entries() - self.prescribed.len() - following
     }
 
     /// √(Σ |a_I|²)
-    pub fn norm(&self, a: &[Vector<f64, D>]) -> f64 {
+    pub(crate) fn norm(&self, a: &[Vector<f64, D>]) -> f64 {
         vector::norm(bytemuck::cast_slice(a))
     }
 
     /// The prescribed values: (node, component).
-    pub fn prescribed(&self) -> &[(usize, usize)] {
+    pub(crate) fn prescribed(&self) -> &[(usize, usize)] {
         &self.prescribed
     }
 
     /// E, by which outer nodes follow inner ones.
-    pub fn followers(&self) -> &Followers<D> {
+    pub(crate) fn followers(&self) -> &Followers<D> {
         &self.followers
     }
 
     /// u = E û, in place.
-    pub fn extend<T: Real + Send + Sync>(&self, field: &mut [Vector<T, D>]) {
+    pub(crate) fn extend<T: Real + Send + Sync>(&self, field: &mut [Vector<T, D>]) {
         self.followers.extend(field);
     }
 
     /// E û
-    pub fn extended<'b, T: Real + Send + Sync>(&self, field: &'b [Vector<T, D>]) -> Cow<'b, [Vector<T, D>]> {
+    pub(crate) fn extended<'b, T: Real + Send + Sync>(&self, field: &'b [Vector<T, D>]) -> Cow<'b, [Vector<T, D>]> {
         let mut field = Cow::Borrowed(field);
         if !self.followers.is_empty() {
             self.extend(field.to_mut());
@@ -82,7 +82,7 @@ impl<const D: usize> Space<D> {
     }
 
     /// E û in pooled memory; `None` if no node follows others.
-    pub fn extended_in_pool(&self, field: &[Vector<f64, D>]) -> Option<Pooled<Vector<f64, D>>> {
+    pub(crate) fn extended_in_pool(&self, field: &[Vector<f64, D>]) -> Option<Pooled<Vector<f64, D>>> {
         if self.followers.is_empty() {
             return None;
         }
@@ -93,17 +93,17 @@ impl<const D: usize> Space<D> {
     }
 
     /// R̂ = Eᵀ R, in place. Values that follow become zero.
-    pub fn restrict<T: Real + Send + Sync>(&self, forces: &mut [Vector<T, D>]) {
+    pub(crate) fn restrict<T: Real + Send + Sync>(&self, forces: &mut [Vector<T, D>]) {
         self.followers.restrict(forces);
     }
 
     /// |E|ᵀ applied to round-off bounds, in place.
-    pub fn restrict_magnitudes<T: Real + Send + Sync>(&self, magnitudes: &mut [Vector<T, D>]) {
+    pub(crate) fn restrict_magnitudes<T: Real + Send + Sync>(&self, magnitudes: &mut [Vector<T, D>]) {
         self.followers.restrict_magnitudes(magnitudes);
     }
 
     /// Sets the prescribed values to zero.
-    pub fn clear_prescribed<T: num_traits::Zero + Copy + nalgebra::Scalar>(&self, field: &mut [Vector<T, D>]) {
+    pub(crate) fn clear_prescribed<T: num_traits::Zero + Copy + nalgebra::Scalar>(&self, field: &mut [Vector<T, D>]) {
         mutant!("unknowns: prescribed values are not cleared": { return; });
         for &(node, component) in &self.prescribed {
             field[node][component] = T::zero();
@@ -111,14 +111,14 @@ impl<const D: usize> Space<D> {
     }
 
     /// The mask of prescribed values, node by node.
-    pub fn prescribed_mask(&self) -> Vec<bool> {
+    pub(crate) fn prescribed_mask(&self) -> Vec<bool> {
         let mut mask = vec![false; self.entries()];
         self.prescribed.iter().for_each(|(node, component)| mask[node * D + component] = true);
         mask
     }
 
     /// The mask of values that follow inner nodes, node by node.
-    pub fn following_mask(&self) -> Vec<bool> {
+    pub(crate) fn following_mask(&self) -> Vec<bool> {
         let mut mask = vec![false; self.entries()];
         for (outer, follows, _) in self.followers.rows() {
             mask[outer * D..(outer + 1) * D].copy_from_slice(&follows);
@@ -156,7 +156,7 @@ impl<const D: usize> Space<D> {
     }
 
     /// The nodes whose effective shape functions differ between components.
-    pub fn uncoupled(&self) -> BTreeSet<usize> {
+    pub(crate) fn uncoupled(&self) -> BTreeSet<usize> {
         let apart = |follows: &[bool; D]| follows.iter().any(|one| *one != follows[0]);
         let rows = self.followers.rows().filter(|(_, follows, _)| apart(follows));
         rows.flat_map(|(_, _, leaders)| leaders.map(|(leader, _)| leader)).collect()

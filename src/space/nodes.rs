@@ -79,7 +79,7 @@ impl Nodes {
     }
 
     /// Grid numbers of the active nodes, ascending.
-    pub fn ids(&self) -> impl Iterator<Item = u64> {
+    pub(crate) fn ids(&self) -> impl Iterator<Item = u64> {
         self.bricks.iter().flat_map(|brick| bits(brick.active).map(|k| brick.number * BRICK + k))
     }
 

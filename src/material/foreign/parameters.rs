@@ -53,7 +53,7 @@ pub enum TangentOf {
 
 impl TangentOf {
     /// The measure of the crate `tangent-check`.
-    pub fn measure(self) -> Measure {
+    pub(crate) fn measure(self) -> Measure {
         match self {
             Self::JaumannKirchhoff => Measure::JaumannKirchhoff,
             Self::JaumannCauchy => Measure::JaumannCauchy,

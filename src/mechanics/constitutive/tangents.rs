@@ -17,7 +17,7 @@ pub(crate) enum Form {
 
 impl Form {
     /// Number of stored numbers a particle.
-    pub const fn rows(self, dimension: usize) -> usize {
+    pub(crate) const fn rows(self, dimension: usize) -> usize {
         let symmetric = dimension * (dimension + 1) / 2;
         let closed = dimension * dimension + symmetric + 2;
         match self {

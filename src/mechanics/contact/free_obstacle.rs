@@ -55,7 +55,7 @@ pub(crate) struct FreePoint<const D: usize> {
 
 impl FreeMotion {
     /// The motion of the whole step, of which this is the part `theta`; `None` if it is not accepted. A turn of the whole step is below π.
-    pub fn whole(&self, theta: f64) -> Option<Vector<f64, 6>> {
+    pub(crate) fn whole(&self, theta: f64) -> Option<Vector<f64, 6>> {
         let q = self.q / theta;
         mutant!("free obstacles: they stay where forces are in balance": q = self.q);
         (self.is_balanced && turn(&q).norm() < PI).then_some(q)
@@ -64,7 +64,7 @@ impl FreeMotion {
 
 impl<const D: usize> FreeBalance<'_, D> {
     /// q with r(q) = 0. `points_at` gives the points in contact after a motion.
-    pub fn solve(&self, points_at: impl Fn(&Vector<f64, 6>) -> Vec<ContactPoint<f64, D>>) -> FreeMotion {
+    pub(crate) fn solve(&self, points_at: impl Fn(&Vector<f64, 6>) -> Vec<ContactPoint<f64, D>>) -> FreeMotion {
         // At t_n the pose is known.
         if self.alphas.dt == 0.0 {
             return FreeMotion { q: Vector::zeros(), inverse_slope: Tensor::zeros(), is_balanced: true };
@@ -100,7 +100,7 @@ impl<const D: usize> FreeBalance<'_, D> {
 
     /// q with all derivatives that `T` carries, by the implicit function theorem. Each iteration makes one more order of them right. The last
     /// iteration changes nothing if ∂r/∂q is exact, so that the check of the tangent sees a wrong ∂r/∂q.
-    pub fn implicit<T: Real>(
+    pub(crate) fn implicit<T: Real>(
         &self,
         FreeMotion { q, inverse_slope, .. }: FreeMotion,
         points_at: impl Fn(&Vector<T, 6>) -> Vec<ContactPoint<T, D>>,
@@ -168,7 +168,7 @@ impl<const D: usize> FreeBalance<'_, D> {
     }
 
     /// ∂q/∂x of a point, and ∂f/∂q of its force.
-    pub fn linearized(
+    pub(crate) fn linearized(
         &self,
         FreeMotion { q, inverse_slope, .. }: &FreeMotion,
         one: &ContactPoint<f64, D>,
@@ -200,12 +200,12 @@ impl<const D: usize> FreeBalance<'_, D> {
 }
 
 impl<const D: usize> FreePoint<D> {
-    pub fn zero() -> Self {
+    pub(crate) fn zero() -> Self {
         Self { of_motion: SMatrix::zeros(), motion: SMatrix::zeros() }
     }
 
     /// Adds a point with a weight for every component of its place.
-    pub fn add(&mut self, Self { of_motion, motion }: &Self, weights: &[f64; D]) {
+    pub(crate) fn add(&mut self, Self { of_motion, motion }: &Self, weights: &[f64; D]) {
         self.of_motion += SMatrix::<f64, D, 6>::from_fn(|i, k| weights[i] * of_motion[(i, k)]);
         self.motion += SMatrix::<f64, 6, D>::from_fn(|i, k| motion[(i, k)] * weights[k]);
     }

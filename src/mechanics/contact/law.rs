@@ -67,14 +67,14 @@ pub(super) struct Ends<const D: usize> {
 
 impl<const D: usize> ContactLaw<D> {
     /// The traction on the body, per reference area.
-    pub fn traction<T: Real>(&self, y: &Vector<T, D>) -> Vector<T, D> {
+    pub(crate) fn traction<T: Real>(&self, y: &Vector<T, D>) -> Vector<T, D> {
         let (normal, pressure) = (self.feature.at(y).normal, self.pressure(y));
         mutant!("contact: an obstacle pulls": pressure = -pressure);
         normal * pressure + self.friction_under(pressure, y, &normal)
     }
 
     /// The part of the traction by friction.
-    pub fn friction<T: Real>(&self, y: &Vector<T, D>) -> Vector<T, D> {
+    pub(crate) fn friction<T: Real>(&self, y: &Vector<T, D>) -> Vector<T, D> {
         self.friction_under(self.pressure(y), y, &self.feature.at(y).normal)
     }
 
@@ -89,7 +89,7 @@ impl<const D: usize> ContactLaw<D> {
     }
 
     /// p
-    pub fn pressure<T: Real>(&self, y: &Vector<T, D>) -> T {
+    pub(crate) fn pressure<T: Real>(&self, y: &Vector<T, D>) -> T {
         let Some((before, after)) = self.gaps(y) else { return self.feature.at(y).distance * T::lit(-self.stiffness) };
         let half = T::lit(0.5 * self.stiffness);
         match (before.value() < 0.0, after.value() < 0.0) {
@@ -125,7 +125,7 @@ impl<const D: usize> ContactLaw<D> {
     }
 
     /// −∂t/∂y of the traction t.
-    pub fn tangent(&self, y: &Vector<f64, D>) -> Tensor<f64, D> {
+    pub(crate) fn tangent(&self, y: &Vector<f64, D>) -> Tensor<f64, D> {
         let (n, pressure) = (self.feature.at(y).normal, self.pressure(y));
         let (slope, mu) = (self.pressure_slope(y), self.friction);
         let curvature = self.feature.curvature(y);
@@ -150,25 +150,25 @@ impl<const D: usize> ContactLaw<D> {
     }
 
     /// ½ k g², the potential of the pressure per reference area.
-    pub fn energy<T: Real>(&self, y: &Vector<T, D>) -> T {
+    pub(crate) fn energy<T: Real>(&self, y: &Vector<T, D>) -> T {
         let gap = self.feature.at(y).distance;
         gap * gap * T::lit(0.5 * self.stiffness)
     }
 
     /// ½ k |s|², the energy stored by the elastic slip per reference area. The anchor is that of an end of a step.
-    pub fn slip_energy(&self, y: &Vector<f64, D>) -> f64 {
+    pub(crate) fn slip_energy(&self, y: &Vector<f64, D>) -> f64 {
         let slip = self.elastic_slip(y);
         mutant!("contact: the elastic slip stores nothing": slip = Vector::zeros());
         if self.has_friction() { 0.5 * self.stiffness * slip.norm_squared() } else { 0.0 }
     }
 
     /// Whether μ > 0.
-    pub fn has_friction(&self) -> bool {
+    pub(crate) fn has_friction(&self) -> bool {
         self.friction > 0.0
     }
 
     /// The elastic slip at the end of a step, at most μ p/k long.
-    pub fn elastic_slip(&self, y: &Vector<f64, D>) -> Vector<f64, D> {
+    pub(crate) fn elastic_slip(&self, y: &Vector<f64, D>) -> Vector<f64, D> {
         let slip = self.slip(y, &self.feature.at(y).normal);
         let (length, longest) = (slip.norm(), self.friction * self.depth(y));
         mutant!("contact: a slip does not move the anchor": longest = f64::INFINITY);
@@ -176,12 +176,12 @@ impl<const D: usize> ContactLaw<D> {
     }
 
     /// The anchor after a step that ends at `y`: it follows a slip at the distance of the elastic slip.
-    pub fn new_anchor(&self, y: &Vector<f64, D>) -> Vector<f64, D> {
+    pub(crate) fn new_anchor(&self, y: &Vector<f64, D>) -> Vector<f64, D> {
         y - self.elastic_slip(y)
     }
 
     /// −g, the depth of the point in the obstacle or in the other body.
-    pub fn depth(&self, y: &Vector<f64, D>) -> f64 {
+    pub(crate) fn depth(&self, y: &Vector<f64, D>) -> f64 {
         -self.feature.at(y).distance
     }
 

@@ -185,12 +185,12 @@ fn pair_point<T: Real, const D: usize>(
 
 impl<const D: usize> Carrier<D> {
     /// The particle itself.
-    pub fn at(particle: usize) -> Self {
+    pub(crate) fn at(particle: usize) -> Self {
         Self { particle, share: 1.0, offset: Vector::zeros() }
     }
 
     /// The position after the nodal motion `phi` since the last grid reset.
-    pub fn position<T: Real>(
+    pub(crate) fn position<T: Real>(
         &self,
         reference: &[Vector<f64, D>],
         supports: &Supports<D>,
@@ -201,7 +201,7 @@ impl<const D: usize> Carrier<D> {
     }
 
     /// The nodes that move the place, and their functions there: N + ∇N·offset.
-    pub fn weights<'a>(&'a self, supports: &'a Supports<D>) -> impl Iterator<Item = (usize, f64)> + 'a {
+    pub(crate) fn weights<'a>(&'a self, supports: &'a Supports<D>) -> impl Iterator<Item = (usize, f64)> + 'a {
         supports.of(self.particle).map(|(node, n, grad_n)| (node, n + grad_n.dot(&self.offset)))
     }
 }
@@ -221,19 +221,19 @@ impl<const D: usize> Candidate<D> {
 
 impl<T: Real, const D: usize> ContactPoint<T, D> {
     /// The force on the body of the point.
-    pub fn force(&self) -> Vector<T, D> {
+    pub(crate) fn force(&self) -> Vector<T, D> {
         self.pose.rotation * self.law.traction(&self.y) * T::lit(self.area)
     }
 }
 
 impl<const D: usize> ContactPoint<f64, D> {
     /// The energy stored by pressure and elastic slip.
-    pub fn stored(&self) -> f64 {
+    pub(crate) fn stored(&self) -> f64 {
         (self.law.energy(&self.y) + self.law.slip_energy(&self.y)) * self.area
     }
 
     /// −∂f/∂x of the force, at a fixed pose.
-    pub fn stiffness(&self) -> Tensor<f64, D> {
+    pub(crate) fn stiffness(&self) -> Tensor<f64, D> {
         let Pose { rotation, .. } = self.pose;
         rotation * self.law.tangent(&self.y) * rotation.transpose() * self.area
     }

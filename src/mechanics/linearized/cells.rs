@@ -24,12 +24,12 @@ pub(crate) struct CellLayout {
 
 impl CellLayout {
     /// Cells with a potential: a and b are both the A of a closed tangent.
-    pub const fn of_potential(dimension: usize) -> Self {
+    pub(crate) const fn of_potential(dimension: usize) -> Self {
         Self { form: Form::Closed, a: 0, b: 0, count: Form::Closed.rows(dimension) }
     }
 
     /// Cells with a mean pressure of the step: 𝔸, then a, then b.
-    pub const fn of_step(dimension: usize) -> Self {
+    pub(crate) const fn of_step(dimension: usize) -> Self {
         let (local, tensor) = (Form::General.rows(dimension), dimension * dimension);
         Self { form: Form::General, a: local, b: local + tensor, count: local + 2 * tensor }
     }
@@ -73,7 +73,7 @@ pub(crate) struct MixedCell<const D: usize> {
 impl<const D: usize> CellRows<D> {
     /// Cells in the displacement form. `fill(cell, particle, L, lane, rows)` writes the numbers of a particle in a cell, where L is that of
     /// the nodal motion `phi`.
-    pub fn new(
+    pub(crate) fn new(
         cells: Arc<Cells>,
         layout: CellLayout,
         stiffness: Vec<f64>,
@@ -94,7 +94,7 @@ impl<const D: usize> CellRows<D> {
     }
 
     /// The cells times a factor, where 𝔸 is zero.
-    pub fn times(mut self, factor: f64) -> Self {
+    pub(crate) fn times(mut self, factor: f64) -> Self {
         self.stiffness.iter_mut().for_each(|stiffness| *stiffness *= factor);
         self
     }
@@ -113,12 +113,12 @@ impl<const D: usize> CellRows<D> {
     }
 
     /// b of a member.
-    pub fn volume_gradient(&self, member: &Member) -> Tensor<f64, D> {
+    pub(crate) fn volume_gradient(&self, member: &Member) -> Tensor<f64, D> {
         self.tensor(member, self.layout.b)
     }
 
     /// δp of every cell: as given in the mixed form, or k δv.
-    pub fn pressure_changes(&self, supports: &Supports<D>, along: Along<'_, D>) -> Vec<f64> {
+    pub(crate) fn pressure_changes(&self, supports: &Supports<D>, along: Along<'_, D>) -> Vec<f64> {
         let volumes = match along {
             Along::Field(_, Some(pressures)) if self.mixed.is_some() => return pressures.to_vec(),
             Along::Field(u, _) => self.volume_changes(supports, u),
@@ -131,7 +131,7 @@ impl<const D: usize> CellRows<D> {
     }
 
     /// δv of every cell.
-    pub fn volume_changes(&self, supports: &Supports<D>, u: &[Vector<f64, D>]) -> Vec<f64> {
+    pub(crate) fn volume_changes(&self, supports: &Supports<D>, u: &[Vector<f64, D>]) -> Vec<f64> {
         let mut grown = supports.pool().unspecified(supports.groups(), [0.0; LANES]);
         supports.fill_rows(u, 1, &mut grown, |group, at, grown| {
             let b = &self.of_group(group.number)[self.layout.b..];
@@ -144,7 +144,7 @@ impl<const D: usize> CellRows<D> {
     }
 
     #[inline(always)]
-    pub fn add_product(&self, changes: &[f64], group: Group<'_>, at: &At<f64, D, D>, sums: &mut At<f64, D, D>) {
+    pub(crate) fn add_product(&self, changes: &[f64], group: Group<'_>, at: &At<f64, D, D>, sums: &mut At<f64, D, D>) {
         let (rows, form) = (self.of_group(group.number), self.layout.form);
         let mut pressures = [0.0; LANES];
         for (lane, &p) in group.particles.iter().enumerate() {
@@ -158,7 +158,7 @@ impl<const D: usize> CellRows<D> {
         }
     }
 
-    pub fn add_quadratic(&self, group: Group<'_>, into: &mut Quadratic) {
+    pub(crate) fn add_quadratic(&self, group: Group<'_>, into: &mut Quadratic) {
         let form = self.layout.form;
         add_quadratic(D, AddTo { form, rows: &self.of_group(group.number)[..form.rows(D)], factor: 1.0, into });
     }
@@ -192,14 +192,14 @@ impl<const D: usize> CellRows<D> {
     }
 
     /// Adds the coupling within the cells to the diagonal blocks: Σ_c k a_I ⊗ b_I.
-    pub fn add_blocks(&self, functions: &FunctionsAt<'_, D>, blocks: &mut [Tensor<f64, D>]) {
+    pub(crate) fn add_blocks(&self, functions: &FunctionsAt<'_, D>, blocks: &mut [Tensor<f64, D>]) {
         self.each_node(functions, blocks.len(), |cell, node, [a, b]| {
             blocks[node] += a * b.transpose() * self.stiffness[cell];
         });
     }
 
     /// B_c M B_cᵀ of every cell, for a block-diagonal M and B = ∂v/∂u.
-    pub fn compliance(&self, functions: &FunctionsAt<'_, D>, inverse: &[Tensor<f64, D>]) -> Vec<f64> {
+    pub(crate) fn compliance(&self, functions: &FunctionsAt<'_, D>, inverse: &[Tensor<f64, D>]) -> Vec<f64> {
         let mut compliance = vec![0.0; self.stiffness.len()];
         self.each_node(functions, inverse.len(), |cell, node, [_, b]| compliance[cell] += b.dot(&(inverse[node] * b)));
         compliance

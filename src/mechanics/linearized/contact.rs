@@ -35,7 +35,7 @@ impl<const D: usize> Default for ContactRows<D> {
 }
 
 impl<const D: usize> ContactRows<D> {
-    pub fn new(rows: Vec<ContactRow<D>>, obstacles: usize, supports: &Supports<D>) -> Self {
+    pub(crate) fn new(rows: Vec<ContactRow<D>>, obstacles: usize, supports: &Supports<D>) -> Self {
         let (mut ends, mut weights) = (Vec::with_capacity(rows.len()), Vec::new());
         for row in &rows {
             for carrier in &row.carriers {
@@ -52,7 +52,7 @@ impl<const D: usize> ContactRows<D> {
         self.rows.iter().zip(starts.zip(&self.ends)).map(|(row, (start, &end))| (row, &self.weights[start..end]))
     }
 
-    pub fn add_product(&self, u: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
+    pub(crate) fn add_product(&self, u: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
         let moved =
             |weights: &[(usize, f64)]| weights.iter().fold(Vector::zeros(), |sum, &(node, n)| sum + u[node] * n);
         // δq of the free obstacles
@@ -72,7 +72,7 @@ impl<const D: usize> ContactRows<D> {
     }
 
     /// W_I² K, with the sum W_I over all places that the node moves. A free obstacle subtracts (Σ W_I ∂f/∂q) (Σ ∂q/∂x W_I).
-    pub fn add_blocks(&self, functions: &FunctionsAt<'_, D>, blocks: &mut [Tensor<f64, D>]) {
+    pub(crate) fn add_blocks(&self, functions: &FunctionsAt<'_, D>, blocks: &mut [Tensor<f64, D>]) {
         let mut through: BTreeMap<(usize, usize), FreePoint<D>> = BTreeMap::new();
         for ContactRow { carriers, tangent, on_free } in &self.rows {
             let mut of_node: BTreeMap<usize, [f64; D]> = BTreeMap::new();

@@ -55,7 +55,7 @@ pub(crate) type FunctionsAt<'a, const D: usize> = dyn Fn(usize) -> Vec<(usize, F
 
 impl<const D: usize> Linearized<D> {
     /// The linearisation of no term.
-    pub fn zero() -> Self {
+    pub(crate) fn zero() -> Self {
         Self {
             mass: 0.0,
             stresses: Vec::new(),
@@ -66,7 +66,7 @@ impl<const D: usize> Linearized<D> {
     }
 
     /// `out += K u`
-    pub fn add_product(
+    pub(crate) fn add_product(
         &self,
         mass: &Mass<'_, D>,
         u: &[Vector<f64, D>],
@@ -82,7 +82,7 @@ impl<const D: usize> Linearized<D> {
     }
 
     /// The part of the product that needs no pass over the particles.
-    pub fn add_product_at_nodes(&self, mass: &Mass<'_, D>, u: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
+    pub(crate) fn add_product_at_nodes(&self, mass: &Mass<'_, D>, u: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
         if self.mass != 0.0 {
             mass.add_lumped(self.mass, u, out);
         }
@@ -98,13 +98,13 @@ impl<const D: usize> Linearized<D> {
     }
 
     /// δp of all averaged cells.
-    pub fn pressure_changes(&self, supports: &Supports<D>, along: Along<'_, D>) -> PressureChanges {
+    pub(crate) fn pressure_changes(&self, supports: &Supports<D>, along: Along<'_, D>) -> PressureChanges {
         self.cells.iter().map(|cells| cells.pressure_changes(supports, along)).collect()
     }
 
     /// Adds q and σ of a group of particles to `sums`.
     #[inline(always)]
-    pub fn add_product_of_group(
+    pub(crate) fn add_product_of_group(
         &self,
         mass: &Mass<'_, D>,
         changes: &PressureChanges,
@@ -124,7 +124,7 @@ impl<const D: usize> Linearized<D> {
     }
 
     /// Adds the diagonal blocks of the lumped mass.
-    pub fn add_blocks_at_nodes(&self, mass: &Mass<'_, D>, blocks: &mut [Tensor<f64, D>]) {
+    pub(crate) fn add_blocks_at_nodes(&self, mass: &Mass<'_, D>, blocks: &mut [Tensor<f64, D>]) {
         if self.mass != 0.0 {
             for (block, m) in blocks.iter_mut().zip(mass.lumped) {
                 *block += scaled(&identity(), self.mass * mass.lumping * m);
@@ -133,19 +133,19 @@ impl<const D: usize> Linearized<D> {
     }
 
     /// Adds the diagonal blocks that need the effective shape functions of single particles.
-    pub fn add_blocks_of_functions(&self, functions: &FunctionsAt<'_, D>, blocks: &mut [Tensor<f64, D>]) {
+    pub(crate) fn add_blocks_of_functions(&self, functions: &FunctionsAt<'_, D>, blocks: &mut [Tensor<f64, D>]) {
         self.cells.iter().for_each(|cells| cells.add_blocks(functions, blocks));
         self.pressures.add_blocks(functions, blocks);
         self.contacts.add_blocks(functions, blocks);
     }
 
     /// Whether particles have a quadratic form.
-    pub fn has_quadratic(&self, mass: &Mass<'_, D>) -> bool {
+    pub(crate) fn has_quadratic(&self, mass: &Mass<'_, D>) -> bool {
         self.mode(mass).is_some()
     }
 
     /// Adds the quadratic form of a group of particles, without the coupling of averaged cells.
-    pub fn add_quadratic(&self, mass: &Mass<'_, D>, group: Group<'_>, form: &mut Quadratic) {
+    pub(crate) fn add_quadratic(&self, mass: &Mass<'_, D>, group: Group<'_>, form: &mut Quadratic) {
         if mass.lumping < 1.0 {
             for (lane, &p) in group.particles.iter().enumerate() {
                 form.mass[lane] += self.mass * mass.consistent(p as usize);
@@ -156,12 +156,12 @@ impl<const D: usize> Linearized<D> {
     }
 
     /// The averaged cells whose dilatation is an unknown of its own.
-    pub fn mixed(&self) -> Option<&CellRows<D>> {
+    pub(crate) fn mixed(&self) -> Option<&CellRows<D>> {
         self.cells.iter().find(|cells| cells.mixed.is_some())
     }
 
     /// Adds `factor` times another linearisation that has masses and rows of particles alone, and shares its rows.
-    pub fn add_scaled(&mut self, other: &Self, factor: f64) {
+    pub(crate) fn add_scaled(&mut self, other: &Self, factor: f64) {
         self.mass += factor * other.mass;
         self.stresses.extend(other.stresses.iter().map(|rows| rows.clone().times(factor)));
         self.cells.extend(other.cells.iter().map(|rows| rows.clone().times(factor)));

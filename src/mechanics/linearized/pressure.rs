@@ -25,7 +25,7 @@ impl<const D: usize> Default for PressureRows<D> {
 }
 
 impl<const D: usize> PressureRows<D> {
-    pub fn add_product(&self, supports: &Supports<D>, u: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
+    pub(crate) fn add_product(&self, supports: &Supports<D>, u: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
         for PressureRow { particle, delta_f, force } in &self.0 {
             let delta = cofactor_derivative(delta_f, &supports.gradient_at(*particle, u)) * force;
             mutant!("loads: the tangent of a pressure has a wrong sign": delta = -delta);
@@ -36,7 +36,7 @@ impl<const D: usize> PressureRows<D> {
     }
 
     /// Column k of a block is N_I times the derivative along L = e_k ⊗ ∇_r N_I.
-    pub fn add_blocks(&self, functions: &FunctionsAt<'_, D>, blocks: &mut [Tensor<f64, D>]) {
+    pub(crate) fn add_blocks(&self, functions: &FunctionsAt<'_, D>, blocks: &mut [Tensor<f64, D>]) {
         for PressureRow { particle, delta_f, force } in &self.0 {
             for (node, function) in functions(*particle) {
                 for k in 0..D {

@@ -17,11 +17,11 @@ pub(crate) struct StressRows {
 
 impl StressRows {
     /// Tangents that are stored in `form`.
-    pub fn new(form: Form, rows: Pooled<[f64; LANES]>) -> Self {
+    pub(crate) fn new(form: Form, rows: Pooled<[f64; LANES]>) -> Self {
         Self { form, rows: Arc::new(rows), factor: 1.0 }
     }
 
-    pub fn times(self, factor: f64) -> Self {
+    pub(crate) fn times(self, factor: f64) -> Self {
         Self { factor: factor * self.factor, ..self }
     }
 
@@ -32,7 +32,7 @@ impl StressRows {
     }
 
     #[inline(always)]
-    pub fn add_product<const D: usize>(&self, group: Group<'_>, at: &At<f64, D, D>, sums: &mut At<f64, D, D>) {
+    pub(crate) fn add_product<const D: usize>(&self, group: Group<'_>, at: &At<f64, D, D>, sums: &mut At<f64, D, D>) {
         let (form, rows, l) = (self.form, self.of_group(group.number, D), at.gradient.as_flattened());
         if self.factor == 1.0 {
             return product(D, Product { form, rows, l, out: sums.gradient.as_flattened_mut() });
@@ -44,7 +44,7 @@ impl StressRows {
         }
     }
 
-    pub fn add_quadratic(&self, dimension: usize, group: Group<'_>, into: &mut Quadratic) {
+    pub(crate) fn add_quadratic(&self, dimension: usize, group: Group<'_>, into: &mut Quadratic) {
         let rows = self.of_group(group.number, dimension);
         add_quadratic(dimension, AddTo { form: self.form, rows, factor: self.factor, into });
     }

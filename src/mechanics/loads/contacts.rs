@@ -106,12 +106,12 @@ pub struct Share<const D: usize> {
 
 impl<const D: usize> Contacts<D> {
     /// Whether bodies may touch anything.
-    pub fn exist(&self) -> bool {
+    pub(crate) fn exist(&self) -> bool {
         !self.obstacles.is_empty() || self.between.is_some()
     }
 
     /// Whether an obstacle moves freely.
-    pub fn has_free_obstacle(&self) -> bool {
+    pub(crate) fn has_free_obstacle(&self) -> bool {
         self.obstacles.iter().any(|obstacle| obstacle.free.is_some())
     }
 
@@ -128,7 +128,7 @@ impl<const D: usize> Contacts<D> {
     }
 
     /// Whether friction acts anywhere.
-    pub fn have_friction(&self) -> bool {
+    pub(crate) fn have_friction(&self) -> bool {
         let between = self.between.iter().map(|between| between.friction);
         self.obstacles.iter().map(|obstacle| obstacle.friction).chain(between).any(|friction| friction > 0.0)
     }

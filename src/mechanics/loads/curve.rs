@@ -118,7 +118,7 @@ impl Curve {
     }
 
     /// The curve times a number.
-    pub fn times(self, factor: f64) -> Self {
+    pub(crate) fn times(self, factor: f64) -> Self {
         Self(match self.0 {
             Kind::Points(points) => Kind::Points(points.into_iter().map(|[t, x]| [t, factor * x]).collect()),
             Kind::Sine(sine) => {

@@ -39,7 +39,7 @@ pub struct Gravity<const D: usize> {
 
 impl<const D: usize> Gravity<D> {
     /// b(t)
-    pub fn at(&self, t: f64) -> Vector<f64, D> {
+    pub(crate) fn at(&self, t: f64) -> Vector<f64, D> {
         self.acceleration * self.curve.value(t)
     }
 }

@@ -90,7 +90,7 @@ impl<const D: usize> Obstacle<D> {
     }
 
     /// Whether the obstacle moves at any time.
-    pub fn moves(&self) -> bool {
+    pub(crate) fn moves(&self) -> bool {
         self.free.is_some() || self.motion.iter().flatten().any(|motion| *motion != Motion::Rest)
     }
 }

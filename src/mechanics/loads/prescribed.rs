@@ -92,7 +92,7 @@ pub enum Selection<const D: usize> {
 
 impl<const D: usize> Prescribed<D> {
     /// The rotation, if the motion is one.
-    pub fn rotation(&self) -> Option<&Rotation<D>> {
+    pub(crate) fn rotation(&self) -> Option<&Rotation<D>> {
         self.motion.iter().flatten().find_map(|motion| match motion {
             Motion::Rotation(rotation) => Some(rotation),
             _ => None,

@@ -209,7 +209,7 @@ impl<const D: usize> RigidBody<D> {
     }
 
     /// The angular velocity in the frame of space.
-    pub fn spin(&self) -> Vector<f64, 3> {
+    pub(crate) fn spin(&self) -> Vector<f64, 3> {
         self.rotation * turn(&self.velocity)
     }
 }

@@ -1,6 +1,6 @@
 //! The energy–momentum scheme, which the paper names as future work.
 
-use super::{Alphas, GeneralizedAlpha, Newmark, Scheme};
+use super::{Alphas, GeneralizedAlpha, Scheme};
 use std::fmt::{Display, Formatter};
 
 /// The midpoint rule, M (v_{n+1} − v_n)/Δt + Σ V₀ P̄ ∇N = f(t_{n+½}) and Δφ = ½ Δt (v_n + v_{n+1}), with the mean stress P̄ of the step
@@ -23,13 +23,6 @@ pub struct EnergyMomentum;
 
 /// The midpoint rule.
 const MIDPOINT: GeneralizedAlpha = GeneralizedAlpha { spectral_radius: 1.0 };
-
-impl EnergyMomentum {
-    /// Newmark's relations between Δφ, v and a.
-    pub fn newmark(&self) -> Newmark {
-        MIDPOINT.newmark()
-    }
-}
 
 impl Display for EnergyMomentum {
     fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {

@@ -82,7 +82,7 @@ pub enum Parameters {
 
 impl Parameters {
     /// The scheme; `newmark` gives the constants of Newmark's method.
-    pub fn scheme(&self, newmark: Newmark) -> Arc<dyn Scheme> {
+    pub(crate) fn scheme(&self, newmark: Newmark) -> Arc<dyn Scheme> {
         match *self {
             Self::Newmark => Arc::new(newmark),
             Self::GeneralizedAlpha(scheme) => Arc::new(scheme),
@@ -93,7 +93,7 @@ impl Parameters {
     }
 
     /// Whether the scheme has inertia, see [`Scheme::has_inertia`].
-    pub fn has_inertia(&self) -> bool {
+    pub(crate) fn has_inertia(&self) -> bool {
         !matches!(self, Self::None | Self::ArcLength)
     }
 

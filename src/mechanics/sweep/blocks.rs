@@ -19,7 +19,7 @@ pub struct Quadratic {
 
 impl Quadratic {
     /// The form B = 0, m = 0.
-    pub fn zero() -> Self {
+    pub(crate) fn zero() -> Self {
         Self { bilinear: [[[[0.0; LANES]; 3]; 3]; MOST_PAIRS], mass: [0.0; LANES] }
     }
 

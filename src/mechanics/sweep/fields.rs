@@ -16,7 +16,7 @@ pub struct Fields<'a> {
 
 impl<'a> Fields<'a> {
     /// The fields of `bodies`, with the body of each particle.
-    pub fn of<L>(bodies: &[Body<L>], body: &'a [u32]) -> Self {
+    pub(crate) fn of<L>(bodies: &[Body<L>], body: &'a [u32]) -> Self {
         let of_body: Vec<u32> = bodies.iter().map(|body| body.field).collect();
         if of_body.iter().all(|field| *field == 0) { Self::default() } else { Self { body, of_body } }
     }

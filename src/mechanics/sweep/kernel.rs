@@ -52,7 +52,7 @@ pub struct At<X, const C: usize, const D: usize> {
 impl<X: Real, const C: usize, const D: usize> At<X, C, D> {
     /// Zero everywhere.
     #[inline(always)]
-    pub fn zero() -> Self {
+    pub(crate) fn zero() -> Self {
         Self { value: [[X::zero(); LANES]; C], gradient: [[[X::zero(); LANES]; D]; C] }
     }
 

@@ -15,12 +15,12 @@ impl Mode {
     /// Values and gradients.
     pub const BOTH: Self = Self { value: true, gradient: true, weights: Weights::Signed };
     /// Gradients alone.
-    pub const GRADIENT: Self = Self { value: false, ..Self::BOTH };
+    pub(crate) const GRADIENT: Self = Self { value: false, ..Self::BOTH };
     /// Values alone.
     pub(crate) const VALUE: Self = Self { gradient: false, ..Self::BOTH };
 
     /// The mode that serves both `self` and `other`, with the weights of `self`.
-    pub fn and(self, other: Self) -> Self {
+    pub(crate) fn and(self, other: Self) -> Self {
         Self { value: self.value || other.value, gradient: self.gradient || other.gradient, ..self }
     }
 }

@@ -135,7 +135,11 @@ impl<const D: usize> Supports<D> {
     }
 
     /// `out_I += Σ_p value(p) N_I`, for C components: 1 or D.
-    pub fn spread<const C: usize>(&self, out: &mut [Vector<f64, C>], value: impl Fn(usize) -> Vector<f64, C> + Sync) {
+    pub(crate) fn spread<const C: usize>(
+        &self,
+        out: &mut [Vector<f64, C>],
+        value: impl Fn(usize) -> Vector<f64, C> + Sync,
+    ) {
         self.spread_with(Weights::Signed, out, value);
     }
 

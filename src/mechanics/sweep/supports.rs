@@ -186,7 +186,7 @@ impl<const D: usize> Supports<D> {
     }
 
     /// These supports with an extension u = E û: outer nodes follow inner ones, and equilibria are solved for the inner nodes alone.
-    pub fn with_extension(self, extension: Extension) -> Self {
+    pub(crate) fn with_extension(self, extension: Extension) -> Self {
         Self { extension: Some(Arc::new(extension)), ..self }
     }
 
@@ -259,12 +259,12 @@ impl<const D: usize> Supports<D> {
     }
 
     /// The active nodes.
-    pub fn active(&self) -> &Nodes {
+    pub(crate) fn active(&self) -> &Nodes {
         &self.nodes
     }
 
     /// The grid of the active nodes.
-    pub fn grid(&self) -> &Grid<D> {
+    pub(crate) fn grid(&self) -> &Grid<D> {
         &self.grid
     }
 

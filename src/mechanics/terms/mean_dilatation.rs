@@ -54,7 +54,12 @@ pub(super) struct State<T> {
 
 impl<T: Real> State<T> {
     /// The state of the cell with the particles `members` and the volume V_c at Θ = 1 + `change`.
-    pub fn of<const D: usize, L: Law>(step: &Step<'_, D, L>, members: &[Member], volume: f64, change: T) -> Self {
+    pub(crate) fn of<const D: usize, L: Law>(
+        step: &Step<'_, D, L>,
+        members: &[Member],
+        volume: f64,
+        change: T,
+    ) -> Self {
         let (particles, per_volume) = (step.particles, ((change + T::one()) * T::lit(volume)).recip());
         let ([mut energy, mut stress, mut stiffness], mut size) = ([T::zero(); 3], 0.0);
         for p in members.iter().map(|member| member.particle as usize) {

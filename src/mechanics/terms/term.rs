@@ -47,7 +47,7 @@ impl<const D: usize, L> Copy for Step<'_, D, L> {}
 
 impl<'a, const D: usize, L> Step<'a, D, L> {
     /// The mass operator.
-    pub fn mass(&self) -> Mass<'a, D> {
+    pub(crate) fn mass(&self) -> Mass<'a, D> {
         let Self { particles, supports, nodal, lumping, .. } = *self;
         Mass { particles, supports, lumped: &nodal.mass, lumping }
     }

@@ -129,7 +129,7 @@ impl<const D: usize> Nodal<D> {
     }
 
     /// φ_n of every node; zero right after a grid reset.
-    pub fn moved(&self, count: usize) -> impl Iterator<Item = Vector<f64, D>> {
+    pub(crate) fn moved(&self, count: usize) -> impl Iterator<Item = Vector<f64, D>> {
         let motion = self.motion.iter().copied().chain(std::iter::repeat(Vector::zeros()));
         motion.take(count)
     }

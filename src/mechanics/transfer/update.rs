@@ -231,7 +231,7 @@ impl<'a, const D: usize> Update<'a, D> {
     }
 
     /// φ, the nodal motion since the last grid reset.
-    pub fn motion(&self) -> &[Vector<f64, D>] {
+    pub(crate) fn motion(&self) -> &[Vector<f64, D>] {
         self.kept.as_deref().unwrap_or(self.dphi)
     }
 
@@ -284,7 +284,7 @@ impl<'a, const D: usize> Update<'a, D> {
     /// Evaluates the internal variables at the end of the step, which [`Self::commit`] then writes. Returns the id of the first particle of
     /// which they, or the energy, are no numbers. Only laws with internal variables and bodies that average their dilatation can have such
     /// particles: of all others, the residual has evaluated the stress there.
-    pub fn remember<L: Law>(
+    pub(crate) fn remember<L: Law>(
         &mut self,
         particles: &Particles<D>,
         bodies: &[Body<L>],

@@ -27,7 +27,7 @@ pub(crate) enum Foot {
 }
 
 impl Mesh {
-    pub fn new(vertices: Vec<Vector3<f64>>, mut triangles: Vec<[u32; 3]>) -> Result<Self, SurfaceError> {
+    pub(crate) fn new(vertices: Vec<Vector3<f64>>, mut triangles: Vec<[u32; 3]>) -> Result<Self, SurfaceError> {
         // A triangle with two equal corners is a line. Its neighbours meet at this line.
         triangles.retain(|[a, b, c]| a != b && b != c && c != a);
         if triangles.is_empty() {
@@ -73,25 +73,25 @@ impl Mesh {
         Ok(Self { vertices, triangles, neighbours, normals, at_vertices, tree })
     }
 
-    pub fn tree(vertices: &[Vector3<f64>], triangles: &[[u32; 3]]) -> Tree {
+    pub(crate) fn tree(vertices: &[Vector3<f64>], triangles: &[[u32; 3]]) -> Tree {
         let bounds = |triangle: &[u32; 3]| Bounds::of(triangle.iter().map(|&i| vertices[i as usize]));
         Tree::new(triangles.iter().map(bounds).collect())
     }
 
     /// The triangles whose bounds meet a box, in order.
-    pub fn meeting(&self, bounds: &Bounds<3>) -> Vec<usize> {
+    pub(crate) fn meeting(&self, bounds: &Bounds<3>) -> Vec<usize> {
         let mut found = Vec::new();
         self.tree.meeting(bounds, |triangle| found.push(triangle));
         found.sort_unstable();
         found
     }
 
-    pub fn corners(&self, triangle: usize) -> [Vector3<f64>; 3] {
+    pub(crate) fn corners(&self, triangle: usize) -> [Vector3<f64>; 3] {
         self.triangles[triangle].map(|i| self.vertices[i as usize])
     }
 
     /// The nearest point of a triangle (Ericson, Real-Time Collision Detection, 5.1.5).
-    pub fn foot(&self, triangle: usize, x: &Vector3<f64>) -> (Vector3<f64>, Foot) {
+    pub(crate) fn foot(&self, triangle: usize, x: &Vector3<f64>) -> (Vector3<f64>, Foot) {
         let [a, b, c] = self.corners(triangle);
         let (ab, ac) = (b - a, c - a);
         let along = |from: Vector3<f64>| (ab.dot(&(x - from)), ac.dot(&(x - from)));
@@ -120,7 +120,7 @@ impl Mesh {
     }
 
     /// The corners of the triangle nearest to `x`, and its part.
-    pub fn nearest_triangle(&self, x: &Vector3<f64>) -> Option<([Vector3<f64>; 3], Foot)> {
+    pub(crate) fn nearest_triangle(&self, x: &Vector3<f64>) -> Option<([Vector3<f64>; 3], Foot)> {
         let (_, triangle, foot) = self.tree.nearest(x, |triangle| {
             let (at, part) = self.foot(triangle, x);
             ((x - at).norm_squared(), part)
@@ -130,7 +130,7 @@ impl Mesh {
 
     /// d and ∇d. The normals of the triangles that meet at the nearest point decide the sign of d, each weighted by its angle (Bærentzen
     /// and Aanæs, 2005).
-    pub fn nearest(&self, x: &Vector3<f64>) -> (f64, Vector3<f64>) {
+    pub(crate) fn nearest(&self, x: &Vector3<f64>) -> (f64, Vector3<f64>) {
         let distance = |triangle: usize| {
             let (at, part) = self.foot(triangle, x);
             ((x - at).norm_squared(), (x - at, part))

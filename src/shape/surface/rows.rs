@@ -16,7 +16,7 @@ type Moments = [f64; 4];
 type Polygon = Vec<Vector3<f64>>;
 
 /// Cuts a convex polygon where a linear function is 0, into a part below and a part above. A polygon in the cut is below.
-pub fn split(polygon: &[Vector3<f64>], f: impl Fn(&Vector3<f64>) -> f64) -> (Polygon, Polygon) {
+pub(crate) fn split(polygon: &[Vector3<f64>], f: impl Fn(&Vector3<f64>) -> f64) -> (Polygon, Polygon) {
     let values: Vec<f64> = polygon.iter().map(f).collect();
     if values.iter().all(|&value| value <= 0.0) {
         return (polygon.to_vec(), Polygon::new());
@@ -79,7 +79,7 @@ fn integrals(polygon: &[Vector3<f64>], f: impl Fn(&Vector3<f64>) -> f64) -> Mome
 
 impl Mesh {
     /// The parts of the solid in `count` equal boxes next to each other along the first axis.
-    pub fn row(&self, first_box: &GridBox<3>, count: usize) -> Vec<Part<3>> {
+    pub(crate) fn row(&self, first_box: &GridBox<3>, count: usize) -> Vec<Part<3>> {
         let GridBox { lower, edges, .. } = first_box;
         let h = edges[0];
         let middle = Vector3::new(lower[0], lower[1] + 0.5 * edges[1], lower[2] + 0.5 * edges[2]);

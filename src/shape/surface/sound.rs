@@ -64,7 +64,7 @@ fn edges([a, b, c]: [u32; 3]) -> [[u32; 2]; 3] {
 ///
 /// # Errors
 /// The first edge that breaks this rule.
-pub fn neighbours(vertices: &[Vector3<f64>], triangles: &[[u32; 3]]) -> Result<Vec<[u32; 3]>, SurfaceError> {
+pub(crate) fn neighbours(vertices: &[Vector3<f64>], triangles: &[[u32; 3]]) -> Result<Vec<[u32; 3]>, SurfaceError> {
     let place = |vertex: u32| vertices[vertex as usize].into();
     let mut along = HashMap::with_capacity(3 * triangles.len());
     for (i, &triangle) in (0..).zip(triangles) {
@@ -83,7 +83,7 @@ pub fn neighbours(vertices: &[Vector3<f64>], triangles: &[[u32; 3]]) -> Result<V
 }
 
 /// A point where two triangles cross, for the crossing triangles with the smallest numbers. Triangles that only touch do not cross.
-pub fn crossing(vertices: &[Vector3<f64>], triangles: &[[u32; 3]], tree: &Tree) -> Option<Vector3<f64>> {
+pub(crate) fn crossing(vertices: &[Vector3<f64>], triangles: &[[u32; 3]], tree: &Tree) -> Option<Vector3<f64>> {
     triangles.iter().enumerate().find_map(|(i, &one)| {
         let mut found: Option<(usize, Vector3<f64>)> = None;
         tree.meeting(tree.of(i), |k| {
@@ -102,7 +102,11 @@ const TOUCHING: f64 = 0.75;
 
 /// A point on a part of the surface that bounds no solid together with the other parts. A part that faces outwards must lie in none of the
 /// others, or in as many parts as cavities. A cavity must lie in one more part than cavities.
-pub fn nested(vertices: &[Vector3<f64>], triangles: &[[u32; 3]], neighbours: &[[u32; 3]]) -> Option<Vector3<f64>> {
+pub(crate) fn nested(
+    vertices: &[Vector3<f64>],
+    triangles: &[[u32; 3]],
+    neighbours: &[[u32; 3]],
+) -> Option<Vector3<f64>> {
     let mut parts: Vec<Vec<usize>> = Vec::new();
     let mut seen = vec![false; triangles.len()];
     for first in 0..triangles.len() {

@@ -22,18 +22,18 @@ pub(crate) struct Tree {
 }
 
 impl Tree {
-    pub fn new(triangles: Vec<Bounds<3>>) -> Self {
+    pub(crate) fn new(triangles: Vec<Bounds<3>>) -> Self {
         let mut all: Vec<u32> = (0..triangles.len() as u32).collect();
         Self { root: Node::new(&mut all, &triangles), triangles }
     }
 
     /// The bounds of a triangle.
-    pub fn of(&self, triangle: usize) -> &Bounds<3> {
+    pub(crate) fn of(&self, triangle: usize) -> &Bounds<3> {
         &self.triangles[triangle]
     }
 
     /// Visits the triangles whose bounds meet a box.
-    pub fn meeting(&self, bounds: &Bounds<3>, mut visit: impl FnMut(usize)) {
+    pub(crate) fn meeting(&self, bounds: &Bounds<3>, mut visit: impl FnMut(usize)) {
         let mut open = vec![&self.root];
         while let Some(node) = open.pop() {
             if node.bounds.meets(bounds) {
@@ -46,7 +46,7 @@ impl Tree {
 
     /// The triangle with the smallest `squared_distance`, and the data that come with it. Among equals, the triangle with the lowest number
     /// wins.
-    pub fn nearest<T>(
+    pub(crate) fn nearest<T>(
         &self,
         x: &Vector3<f64>,
         mut squared_distance: impl FnMut(usize) -> (f64, T),

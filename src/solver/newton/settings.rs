@@ -93,7 +93,7 @@ impl Default for NewtonSettings {
 impl NewtonSettings {
     /// The least ‖R‖ wanted, in units of eps times the magnitude of the contributions to R. A sum of a few dozen contributions is exact to
     /// about this many eps.
-    pub const FLOOR: f64 = 4.0;
+    pub(crate) const FLOOR: f64 = 4.0;
 
     pub(super) fn check(&self) -> Result<(), InvalidSetting> {
         InvalidSetting::check_tolerance("relative_tolerance", self.relative_tolerance)?;

@@ -17,7 +17,7 @@ pub(super) struct Chebyshev {
 
 impl Chebyshev {
     /// The smoother of multigrid.
-    pub fn smoother(largest: f64) -> Self {
+    pub(crate) fn smoother(largest: f64) -> Self {
         Self { degree: 5, part: 30.0, largest }
     }
 }

@@ -52,7 +52,7 @@ pub fn scalar(
     }
 }
 
-pub fn rosenbrock(conservative: bool) -> impl NonlinearProblem<Inadmissible = Outside> {
+pub(crate) fn rosenbrock(conservative: bool) -> impl NonlinearProblem<Inadmissible = Outside> {
     Problem {
         residual: |x: &[f64]| {
             let valley = x[1] - x[0] * x[0];
@@ -73,7 +73,7 @@ pub fn rosenbrock(conservative: bool) -> impl NonlinearProblem<Inadmissible = Ou
 
 /// Springs in a row, fixed at the first end and loaded at the free end. The n unknowns are u, the elongations g, and the force
 /// k g (1 − g²/2ℓ² + g⁴/2ℓ⁴): softening, then hardening.
-pub fn springs(k: f64, l: f64, load: f64, n: usize) -> impl NonlinearProblem<Inadmissible = Outside> {
+pub(crate) fn springs(k: f64, l: f64, load: f64, n: usize) -> impl NonlinearProblem<Inadmissible = Outside> {
     let elongation = |u: &[f64], i: usize| u[i] - if i == 0 { 0.0 } else { u[i - 1] };
     let terms = move |g: f64| {
         let s = (g / l) * (g / l);
@@ -123,7 +123,7 @@ pub fn springs(k: f64, l: f64, load: f64, n: usize) -> impl NonlinearProblem<Ina
 }
 
 /// Π = Σ ¼ x⁴ − ½ x² + ½ i y²: hills with a valley on either side, and directions along which Π only rises.
-pub fn hills(n: usize, with_potential: bool) -> impl NonlinearProblem<Inadmissible = Outside> {
+pub(crate) fn hills(n: usize, with_potential: bool) -> impl NonlinearProblem<Inadmissible = Outside> {
     Problem {
         residual: move |x: &[f64]| {
             Ok((0..n).map(|i| if i.is_multiple_of(2) { x[i].powi(3) - x[i] } else { i as f64 * x[i] }).collect())

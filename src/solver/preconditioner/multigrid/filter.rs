@@ -122,7 +122,7 @@ fn invert<const D: usize>(x: &mut [Vector<f64, D>], [r, p]: &mut [Vec<Vector<f64
 
 impl Filter {
     /// The filter for the nodes of a form, with the inverse diagonal blocks of the tangent.
-    pub fn new<const D: usize>(form: &LocalForm, inverses: &[Tensor<f64, D>]) -> Self {
+    pub(crate) fn new<const D: usize>(form: &LocalForm, inverses: &[Tensor<f64, D>]) -> Self {
         let fixed = form.fixed();
         let is_unknown = |node: usize| (0..D).any(|i| !fixed[node * D + i]);
         let unknowns: Vec<_> =
@@ -144,7 +144,7 @@ impl Filter {
     /// z += D^{−½} Q Qᵀ D^{−½} r
     ///
     /// Values are taken to the lines along each axis in turn: the last one first for Qᵀ, and back for Q.
-    pub fn add<const D: usize>(&self, r: &[f64], z: &mut [f64]) {
+    pub(crate) fn add<const D: usize>(&self, r: &[f64], z: &mut [f64]) {
         mutant!("multigrid: cubic splines have no filter": { return; });
         let (r, scale): (&[Vector<f64, D>], &[Vector<f64, D>]) =
             (bytemuck::cast_slice(r), bytemuck::cast_slice(&self.scale));

@@ -57,7 +57,7 @@ fn between<const D: usize>(index: [u32; 3]) -> impl Iterator<Item = [u32; 3]> {
 
 impl Interpolation {
     /// The interpolation to the nodes with these indices. Returns also the indices of the coarse nodes, and their numbers.
-    pub fn to<const D: usize>(nodes: &[[u32; 3]]) -> (Self, Vec<[u32; 3]>, FxHashMap<[u32; 3], u32>) {
+    pub(crate) fn to<const D: usize>(nodes: &[[u32; 3]]) -> (Self, Vec<[u32; 3]>, FxHashMap<[u32; 3], u32>) {
         let (mut coarse, mut numbers) = (Vec::new(), FxHashMap::default());
         let mut around = Lists { starts: vec![0], entries: Vec::new() };
         for &index in nodes {
@@ -74,7 +74,7 @@ impl Interpolation {
     }
 
     /// The coarse nodes around each finer node, and their weight.
-    pub fn rows(&self) -> impl Iterator<Item = (&[u32], f64)> {
+    pub(crate) fn rows(&self) -> impl Iterator<Item = (&[u32], f64)> {
         (0..self.around.len()).map(|fine| self.row(fine))
     }
 
@@ -85,7 +85,7 @@ impl Interpolation {
     }
 
     /// x += P y at values that are not `fixed`.
-    pub fn prolong<const D: usize>(&self, fixed: &[bool], y: &[Vector<f64, D>], x: &mut [Vector<f64, D>]) {
+    pub(crate) fn prolong<const D: usize>(&self, fixed: &[bool], y: &[Vector<f64, D>], x: &mut [Vector<f64, D>]) {
         let parts = x.chunks_mut(PART).zip(fixed.chunks(D * PART)).enumerate();
         parallel::for_each(parts, &|(part, (x, fixed)): (usize, (&mut [Vector<f64, D>], &[bool]))| {
             for (node, (x, fixed)) in x.iter_mut().zip(fixed.chunks(D)).enumerate() {
@@ -98,7 +98,7 @@ impl Interpolation {
     }
 
     /// Pᵀ r, with zero for the `fixed` values of r.
-    pub fn restrict<const D: usize>(&self, fixed: &[bool], r: &[Vector<f64, D>]) -> Vec<Vector<f64, D>> {
+    pub(crate) fn restrict<const D: usize>(&self, fixed: &[bool], r: &[Vector<f64, D>]) -> Vec<Vector<f64, D>> {
         let mut out = vec![Vector::zeros(); self.within.len()];
         parallel::for_each(out.chunks_mut(PART).enumerate(), &|(part, out): (usize, &mut [Vector<f64, D>])| {
             for (node, out) in out.iter_mut().enumerate() {

@@ -122,7 +122,7 @@ fn cell_matrix<const D: usize>(form: &LocalForm, coarse: [u32; 3], finer: &[usiz
 
 impl<const D: usize> Level<D> {
     /// The next coarser level of a form, and the form of that level.
-    pub fn of(form: &LocalForm) -> (Self, LocalForm) {
+    pub(crate) fn of(form: &LocalForm) -> (Self, LocalForm) {
         let (interpolation, nodes, numbers) = Interpolation::to::<D>(&form.nodes);
         let mut next = LocalForm { grid: form.grid.map(|cells| cells.div_ceil(2)), nodes, ..LocalForm::default() };
         let neighbour = |index: [u32; 3], place: usize| {
@@ -281,7 +281,7 @@ impl<const D: usize> Level<D> {
     }
 
     /// The whole matrix, column by column.
-    pub fn assembled(&self) -> DMatrix<f64> {
+    pub(crate) fn assembled(&self) -> DMatrix<f64> {
         let size = D * self.entries.len();
         let mut matrix = DMatrix::zeros(size, size);
         let mut unit = vec![0.0; size];
@@ -302,12 +302,12 @@ impl<const D: usize> Level<D> {
     }
 
     /// z = D⁻¹ r
-    pub fn precondition(&self, r: &[f64], z: &mut [f64]) {
+    pub(crate) fn precondition(&self, r: &[f64], z: &mut [f64]) {
         multiply_blocks(&self.inverse, r, z);
     }
 
     /// Eᵀ Pᵀ r
-    pub fn restrict(&self, r: &[f64]) -> Vec<f64> {
+    pub(crate) fn restrict(&self, r: &[f64]) -> Vec<f64> {
         let mut out = self.interpolation.restrict::<D>(&self.fixed_finer, bytemuck::cast_slice(r));
         self.followers.restrict::<f64>(&mut out);
         let mut out = bytemuck::allocation::cast_vec(out);
@@ -316,7 +316,7 @@ impl<const D: usize> Level<D> {
     }
 
     /// x += P E y
-    pub fn prolong(&self, mut y: Vec<f64>, x: &mut [f64]) {
+    pub(crate) fn prolong(&self, mut y: Vec<f64>, x: &mut [f64]) {
         self.followers.extend::<f64>(bytemuck::cast_slice_mut(&mut y));
         let (y, x) = (bytemuck::cast_slice(&y), bytemuck::cast_slice_mut(x));
         self.interpolation.prolong::<D>(&self.fixed_finer, y, x);

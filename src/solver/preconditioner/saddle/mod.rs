@@ -31,7 +31,7 @@ pub struct Saddle<const D: usize> {
 
 impl<const D: usize> Saddle<D> {
     /// The preconditioner over one of A + Bᵀ γ B.
-    pub fn over(motions: Box<dyn Preconditioner>) -> Self {
+    pub(crate) fn over(motions: Box<dyn Preconditioner>) -> Self {
         Self { motions, schur: None }
     }
 }
