@@ -31,7 +31,8 @@ const FACTORS: [f64; 2] = [0.5, 2.0];
 
 /// All families with a lumped mass; LME with the paper's width.
 fn families() -> Vec<(&'static str, Approximation)> {
-    let left_out = |name: &str| matches!(name, "lme 0.8" | "lme 1.8" | "lme circle 1.8") || name.starts_with("not-a-knot");
+    let left_out =
+        |name: &str| matches!(name, "lme 0.8" | "lme 1.8" | "lme circle 1.8") || name.starts_with("not-a-knot");
     Approximation::examples().into_iter().filter(|(name, _)| !left_out(name)).collect()
 }
 
@@ -72,13 +73,19 @@ fn block<const D: usize>(shape: &Approximation, lumping: f64) -> Result<Simulati
     }
     let loads = Loads {
         gravity: Some(Gravity { acceleration: gravity, curve: Curve::constant(FACTORS[0]) }),
-        surface: vec![SurfaceLoad { pressing: Pressing::Traction(traction), curve: Curve::constant(FACTORS[1]), points }],
+        surface: vec![SurfaceLoad {
+            pressing: Pressing::Traction(traction),
+            curve: Curve::constant(FACTORS[1]),
+            points,
+        }],
         ..Loads::default()
     };
     let law = Material::from(NeoHookean::ciarlet(Lame::from_young_poisson(1000.0, 0.3)?));
     let grid = Grid { origin: Vector::zeros(), spacing: SPACING, cells: [12; D] };
     let bodies = vec![Body { name: "block".into(), law, density: DENSITY, dilatation: Default::default(), field: 0 }];
-    Ok(Simulation { loads, settings: Settings {
+    Ok(Simulation {
+        loads,
+        settings: Settings {
             lumping,
             initial_guess: InitialGuess::Velocity,
             newton: NewtonSettings {
@@ -87,7 +94,9 @@ fn block<const D: usize>(shape: &Approximation, lumping: f64) -> Result<Simulati
                 ..NewtonSettings::default()
             },
             ..Settings::default()
-        }, ..Simulation::new(grid, shape.clone(), bodies, particles, Clock::new(STEP, 0)) })
+        },
+        ..Simulation::new(grid, shape.clone(), bodies, particles, Clock::new(STEP, 0))
+    })
 }
 
 /// Σ m x / Σ m
@@ -95,7 +104,12 @@ fn centre<const D: usize>(particles: &Particles<D>, mass: f64) -> Vector<f64, D>
     particles.position.iter().zip(&particles.mass).map(|(x, &m)| x * m).sum::<Vector<f64, D>>() / mass
 }
 
-fn fall<const D: usize>(name: &str, shape: &Approximation, lumping: f64, report: &mut Report) -> Result<(), StudyError> {
+fn fall<const D: usize>(
+    name: &str,
+    shape: &Approximation,
+    lumping: f64,
+    report: &mut Report,
+) -> Result<(), StudyError> {
     let mut simulation = block::<D>(shape, lumping)?;
     let mass: f64 = simulation.particles.mass.iter().sum();
     let mut force: Vector<f64, D> = Vector::zeros();
@@ -119,7 +133,8 @@ fn fall<const D: usize>(name: &str, shape: &Approximation, lumping: f64, report:
     let accelerated: Vector<f64, D> =
         simulation.particles.acceleration.iter().zip(&simulation.particles.mass).map(|(a, &m)| a * m).sum();
     let (dimension, eps) = (D.to_string(), lumping.to_string());
-    let mut push = |quantity: &str, value: f64| report.push(&[quantity, name, &dimension, &eps], value, Bound::AtMost(EXACT));
+    let mut push =
+        |quantity: &str, value: f64| report.push(&[quantity, name, &dimension, &eps], value, Bound::AtMost(EXACT));
     push("m v = m v_0 + f t", momentum.norm() / (force.norm() * t));
     push("x = x_0 + v_0 t + f t^2 / 2m", moved.norm() * mass / (0.5 * force.norm() * t * t));
     push("m a = f", (accelerated - force).norm() / force.norm());

@@ -8,9 +8,7 @@ use crate::table::Table;
 use bfree::plan::Plan;
 use bfree::pooled::Pool;
 use bfree::simulation::Simulation;
-use bfree::solver::{
-    ConjugateGradientSettings, LinearReport, Preconditioning, conjugate_gradient,
-};
+use bfree::solver::{ConjugateGradientSettings, LinearReport, Preconditioning, conjugate_gradient};
 
 /// The summary in the list of studies.
 pub(super) const ABOUT: &str = "one linear system by conjugate gradients with each preconditioner";

@@ -5,7 +5,9 @@ use super::{Effort, Outcome, StudyError, short};
 use crate::report::{Bound, Report};
 use bfree::material::{Lame, Law as _, Material, MaterialState, first_piola};
 use bfree::tensor::Tensor;
-use tangent_check::convention::{Components, Configuration, Convention, Measure, cauchy_stress, convert, stress_vector};
+use tangent_check::convention::{
+    Components, Configuration, Convention, Measure, cauchy_stress, convert, stress_vector,
+};
 use tangent_check::finding::{Finding, Verdict};
 use tangent_check::law::{self, CallFailed, Response, Step};
 use tangent_check::matrix::Matrix;
@@ -13,7 +15,8 @@ use tangent_check::roads::check_law;
 use tangent_check::states::for_law;
 
 /// The summary in the list of studies.
-pub(super) const ABOUT: &str = "the shipped laws as black boxes: no false alarm of the checker that everybody uses, in three conventions";
+pub(super) const ABOUT: &str =
+    "the shipped laws as black boxes: no false alarm of the checker that everybody uses, in three conventions";
 
 /// The seed of the paths.
 const SEED: u64 = 1;
@@ -80,7 +83,14 @@ impl law::Law for BlackBox {
 pub(super) fn run(_effort: &Effort) -> Result<Outcome, StudyError> {
     let conventions = [
         ("P by F", Convention::piola_in_rows()),
-        ("S by E", Convention { measure: Measure::SecondPiolaByGreen, stress: Components::voigt(1.0), strain: Components::voigt(2.0) }),
+        (
+            "S by E",
+            Convention {
+                measure: Measure::SecondPiolaByGreen,
+                stress: Components::voigt(1.0),
+                strain: Components::voigt(2.0),
+            },
+        ),
         ("Abaqus", Convention::abaqus(Measure::JaumannKirchhoff)),
     ];
     let title = "laws that are right: states not found consistent, and the least error that is seen in every state";
@@ -103,7 +113,11 @@ fn judge(law: &str, convention: &str, findings: &[Finding], report: &mut Report)
     report.push(&[law, convention, "states"], findings.len() as f64, Bound::AtLeast(40.0));
     report.push(&[law, convention, "false alarms"], wrong, Bound::AtMost(0.0));
     report.push(&[law, convention, "not checked, and no kink"], not_checked, Bound::AtMost(0.0));
-    report.push(&[law, convention, "not checked at a kink"], count(&|finding| finding.verdict == Verdict::NotChecked), Bound::Reported);
+    report.push(
+        &[law, convention, "not checked at a kink"],
+        count(&|finding| finding.verdict == Verdict::NotChecked),
+        Bound::Reported,
+    );
     let seen = findings.iter().filter_map(|finding| finding.control).fold(0.0, f64::max);
     report.push(&[law, convention, "least error seen in every state"], seen, Bound::AtMost(SEEN));
     let calls = findings.iter().map(|finding| finding.calls).max().unwrap_or(0);

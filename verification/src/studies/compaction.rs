@@ -11,7 +11,8 @@ use plotters::prelude::SeriesLabelPosition;
 use rayon::prelude::*;
 
 /// The summary in the list of studies.
-pub(super) const ABOUT: &str = "a block compacted by its own weight (section 4.2), beside Q8 finite elements of an independent program";
+pub(super) const ABOUT: &str =
+    "a block compacted by its own weight (section 4.2), beside Q8 finite elements of an independent program";
 
 /// The observed position: that of a particle next to the middle of the top.
 const PROBE: [f64; 2] = [0.525, 0.975];

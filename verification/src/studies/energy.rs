@@ -72,12 +72,18 @@ fn dimension<const D: usize>(name: &str, law: &Material, report: &mut Report) ->
             let mut dphi: Vec<Vector<f64, D>> = random.field(coming.nodes().len()).iter().map(|x| x * size).collect();
             coming.prescribe(&mut dphi);
             for measured in measure(&coming.equilibrium(), &dphi, &mut random)? {
-                let (of_stress, of_both) =
-                    (["stress", "geometric", "material", "damping"], ["mean dilatation", "whole product", "diagonal blocks"]);
+                let (of_stress, of_both) = (
+                    ["stress", "geometric", "material", "damping"],
+                    ["mean dilatation", "whole product", "diagonal blocks"],
+                );
                 let quantity = measured.quantity.as_str();
                 if of_both.contains(&quantity) || !averaged && of_stress.contains(&quantity) {
                     let quantity = if averaged { format!("{quantity}, averaged") } else { quantity.to_owned() };
-                    report.push(&[&quantity, &*short(name), &D.to_string(), regime.name()], measured.value, Bound::AtMost(TANGENT));
+                    report.push(
+                        &[&quantity, &*short(name), &D.to_string(), regime.name()],
+                        measured.value,
+                        Bound::AtMost(TANGENT),
+                    );
                 }
             }
         }
@@ -165,7 +171,8 @@ fn laws() -> Result<Report, StudyError> {
     }
     let rubber = Material::from(NeoHookean::ciarlet(Lame::from_young_poisson(YOUNG_OF_RUBBER, 0.499)?));
     for (name, shape) in [("linear", Approximation::from(Linear)), ("cubic", Bspline::Cubic.into())] {
-        let measured = changes(averaged(block::<2>(&shape, 1.0, Arc::new(EnergyMomentum), LARGE), &rubber), 100, of_plane);
+        let measured =
+            changes(averaged(block::<2>(&shape, 1.0, Arc::new(EnergyMomentum), LARGE), &rubber), 100, of_plane);
         let label = format!("nearly incompressible, averaged, {name}");
         push(&mut report, &[&label, "kept"], &["energy", "angular momentum"], measured, [Some(CONSERVED); 2]);
     }
@@ -207,7 +214,10 @@ fn yielded(law: &Material) -> Result<f64, StudyError> {
 
 /// What other schemes change, and the transfer alone: a grid that is reset in every step.
 fn schemes() -> Report {
-    let mut report = Report::new("other schemes, and grid resets: linear functions, 100 steps", &["scheme", "grid, Courant number", "change of"]);
+    let mut report = Report::new(
+        "other schemes, and grid resets: linear functions, 100 steps",
+        &["scheme", "grid, Courant number", "change of"],
+    );
     let all: [(&str, Arc<dyn Scheme>); 3] = [
         ("Newmark", Arc::new(Newmark::default())),
         ("midpoint rule", Arc::new(GeneralizedAlpha { spectral_radius: 1.0 })),
@@ -223,7 +233,13 @@ fn schemes() -> Report {
             simulation.settings.grid_reset = reset;
             simulation.settings.lumping = lumping;
             let keeps = scheme.balance(1.0).discrete_gradient && reset == GridReset::Never;
-            push(&mut report, &[name, grid], &["energy", "angular momentum"], changes(simulation, 100, of_plane), [keeps.then_some(CONSERVED); 2]);
+            push(
+                &mut report,
+                &[name, grid],
+                &["energy", "angular momentum"],
+                changes(simulation, 100, of_plane),
+                [keeps.then_some(CONSERVED); 2],
+            );
         }
     }
     report
@@ -233,7 +249,11 @@ fn schemes() -> Report {
 fn floor(effort: Effort) -> Result<Report, StudyError> {
     let title = "a disc bounces off a floor with friction, the grid kept, eps = 0: error of the energy balance over the energy at the start";
     let mut report = Report::new(title, &["scheme", "steps", "error of"]);
-    let schemes = [("Newmark", "\"newmark\""), ("midpoint rule", r#"{"generalized_alpha": {"spectral_radius": 1}}"#), ("energy-momentum", "\"energy_momentum\"")];
+    let schemes = [
+        ("Newmark", "\"newmark\""),
+        ("midpoint rule", r#"{"generalized_alpha": {"spectral_radius": 1}}"#),
+        ("energy-momentum", "\"energy_momentum\""),
+    ];
     // At short effort the longest steps alone.
     let count = if effort == Effort::Full { 3 } else { 1 };
     for (name, scheme) in schemes {
@@ -246,7 +266,13 @@ fn floor(effort: Effort) -> Result<Report, StudyError> {
             for tolerance in [1e-2, 1e-3, 1e-4].into_iter().take(count) {
                 let keys = ["time.step=0.01".to_owned(), format!("time.adaptive={{\"tolerance\": {tolerance}}}")];
                 let bound = if name == "Newmark" { ADAPTIVE } else { CONSERVED };
-                push(&mut report, &[name, &format!("adaptive, {tolerance:e}")], &["energy balance"], bounce(scheme, &keys), [Some(bound)]);
+                push(
+                    &mut report,
+                    &[name, &format!("adaptive, {tolerance:e}")],
+                    &["energy balance"],
+                    bounce(scheme, &keys),
+                    [Some(bound)],
+                );
             }
         }
     }
@@ -262,7 +288,8 @@ fn bounce(scheme: &str, keys: &[String]) -> Result<[f64; 1], StudyError> {
     let keys = keys.map(|key| key.parse()).collect::<Result<Vec<Override>, _>>()?;
     let mut simulation: Simulation<2> = read_file(&folder.join("bounce.json"), &keys)?.build(&folder)?;
     simulation.settings.newton.relative_tolerance = 1e-13;
-    let balance = |of: &Simulation<2>| of.particles.kinetic_energy() + of.strain_energy() + of.contact_energy() + of.dissipated;
+    let balance =
+        |of: &Simulation<2>| of.particles.kinetic_energy() + of.strain_energy() + of.contact_energy() + of.dissipated;
     let (start, mut worst) = (balance(&simulation), 0.0);
     while simulation.clock.time() < 0.3 {
         simulation.advance()?;

@@ -22,7 +22,8 @@ use bfree::tensor::Vector;
 use std::f64::consts::PI;
 
 /// The summary in the list of studies.
-pub(super) const ABOUT: &str = "a rigid-plastic cylinder whose hole is widened from 10 to 85 mm, against the formula of its stress";
+pub(super) const ABOUT: &str =
+    "a rigid-plastic cylinder whose hole is widened from 10 to 85 mm, against the formula of its stress";
 
 /// a at the start and the end, b at the start, and σ_Y.
 const INNER: [f64; 2] = [10.0, 85.0];

@@ -6,7 +6,7 @@
 use super::{Effort, Outcome, StudyError};
 use crate::report::{Bound, Report};
 use crate::table::Table;
-use bfree::material::{Lame, Law, Material, NeoHookean, MaterialState};
+use bfree::material::{Lame, Law, Material, MaterialState, NeoHookean};
 use bfree::scene;
 use bfree::simulation::Simulation;
 use bfree::tensor::{Tensor, Vector, determinant};
@@ -93,14 +93,18 @@ impl Form {
     /// The shape in the form of a scene.
     fn shape(self, spacing: f64) -> Value {
         match self {
-            Self::Box { offset } => json!({ "box": { "min": [0, 0], "max": [1.0 + offset * spacing, 0.75 + offset * spacing] } }),
+            Self::Box { offset } => {
+                json!({ "box": { "min": [0, 0], "max": [1.0 + offset * spacing, 0.75 + offset * spacing] } })
+            }
             Self::Turned => {
                 let [along, across] = turned();
                 let corner = [1.0 + 0.8 * across[0], 0.8 * across[1]];
                 let left = corner[1] - corner[0] * along[1] / along[0];
                 json!({ "polygon": [[0, 0], [1, 0], corner, [0, left]] })
             }
-            Self::Disc => json!({ "intersection": [{ "ball": { "center": [0, 0], "radius": 0.97 } }, { "box": { "min": [0, 0], "max": [1.5, 1.5] } }] }),
+            Self::Disc => {
+                json!({ "intersection": [{ "ball": { "center": [0, 0], "radius": 0.97 } }, { "box": { "min": [0, 0], "max": [1.5, 1.5] } }] })
+            }
         }
     }
 
@@ -184,7 +188,9 @@ fn scene(case: &Case, family: &Value, cells: u32, exact: &Exact, law: &Material)
         "solver": { "newton": { "tolerance": 1e-14 }, "krylov": { "forcing": { "fixed": 1e-6 } } },
     });
     match case.load {
-        Load::Pressure => scene["pressures"] = json!([{ "body": "body", "pressure": -cauchy(law, exact.gradient)[(0, 0)] }]),
+        Load::Pressure => {
+            scene["pressures"] = json!([{ "body": "body", "pressure": -cauchy(law, exact.gradient)[(0, 0)] }])
+        }
         Load::Tension => {
             let loaded = case.form.faces(spacing).into_iter().map(|(point, normal)| {
                 let traction = exact.piola * Vector::from(normal);
@@ -236,7 +242,9 @@ fn errors(case: &Case, family: &Value, cells: u32) -> Result<Errors, StudyError>
         let displacement = (now.position[p] - x - exact.gradient * shown[p]).norm() / greatest;
         let stress = (cauchy(&law, now.displacement_gradient[p]) - stress).norm() / stress.norm();
         // `max` would drop NaN.
-        for (worst, one) in [(&mut found.displacement[where_read], displacement), (&mut found.stress[where_read], stress)] {
+        for (worst, one) in
+            [(&mut found.displacement[where_read], displacement), (&mut found.stress[where_read], stress)]
+        {
             if one.is_nan() || one > *worst {
                 *worst = one;
             }
@@ -268,13 +276,18 @@ fn judge(report: &mut Report, names: [&str; 2], exact: bool, [coarse, fine]: [Er
 
 pub(super) fn run(_effort: &Effort) -> Result<Outcome, StudyError> {
     let mut report = Report::new("greatest errors, relative", &["case", "shape", "of"]).as_matrix(&[0, 2], 1, 1);
-    let header = ["case", "shape", "cells", "particles", "displacement", "at the face", "stress", "at the face", "dissipated"];
-    let mut table = Table::new("greatest errors, relative to the greatest displacement and to the stress applied", header);
+    let header =
+        ["case", "shape", "cells", "particles", "displacement", "at the face", "stress", "at the face", "dissipated"];
+    let mut table =
+        Table::new("greatest errors, relative to the greatest displacement and to the stress applied", header);
     let families = families();
-    let all: Vec<(&Case, &(&str, Value))> = CASES.iter().flat_map(|case| families.iter().map(move |family| (case, family))).collect();
+    let all: Vec<(&Case, &(&str, Value))> =
+        CASES.iter().flat_map(|case| families.iter().map(move |family| (case, family))).collect();
     let found: Vec<[Result<Errors, String>; 2]> = all
         .par_iter()
-        .map(|(case, family)| CELLS.map(|cells| errors(case, &family.1, cells).map_err(|error| crate::report::chain(error.as_ref()))))
+        .map(|(case, family)| {
+            CELLS.map(|cells| errors(case, &family.1, cells).map_err(|error| crate::report::chain(error.as_ref())))
+        })
         .collect();
     for ((case, (family, _)), found) in all.into_iter().zip(found) {
         for (cells, found) in CELLS.iter().zip(&found) {
@@ -312,7 +325,10 @@ mod tests {
         let tension = Exact::of(&law, Load::Tension).piola;
         assert!(tension[(1, 1)].abs() < 1e-12 * tension[(0, 0)] && tension[(0, 0)] > 0.9 * STRAIN * YOUNG, "{tension}");
         let stress = cauchy(&law, Exact::of(&law, Load::Pressure).gradient);
-        assert!(stress[(0, 0)] < 0.0 && (stress - Tensor::<f64, 2>::identity() * stress[(0, 0)]).norm() < 1e-12, "{stress}");
+        assert!(
+            stress[(0, 0)] < 0.0 && (stress - Tensor::<f64, 2>::identity() * stress[(0, 0)]).norm() < 1e-12,
+            "{stress}"
+        );
         Ok(())
     }
 }

@@ -53,11 +53,7 @@ fn membrane(shape: &str, poisson: f64, cells: u32, averaged: bool) -> Result<End
     let now = simulation.particles.by_id();
     let away = |p: usize| (start.position[p] - Vector::from([48.0, 52.0])).norm();
     let tip = (0..start.len()).min_by(|&a, &b| away(a).total_cmp(&away(b))).ok_or("no particles")?;
-    Ok(End {
-        tip: now.position[tip][1] - start.position[tip][1],
-        newton,
-        krylov,
-    })
+    Ok(End { tip: now.position[tip][1] - start.position[tip][1], newton, krylov })
 }
 
 pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
@@ -71,8 +67,10 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     );
     let header = ["shape", "volume", "Poisson's ratio", "cells an edge", "displacement", "error", "Newton", "Krylov"];
     let mut table = Table::new("Cook's membrane, beside elements of the same law", header);
-    let of_shape = |shape| [false, true].into_iter().flat_map(move |averaged| known.iter().map(move |of| (shape, averaged, of)));
-    let cases: Vec<_> = SHAPES.iter().flat_map(of_shape).flat_map(|case| cells.iter().map(move |&n| (case, n))).collect();
+    let of_shape =
+        |shape| [false, true].into_iter().flat_map(move |averaged| known.iter().map(move |of| (shape, averaged, of)));
+    let cases: Vec<_> =
+        SHAPES.iter().flat_map(of_shape).flat_map(|case| cells.iter().map(move |&n| (case, n))).collect();
     // Runs in parallel: a small membrane keeps one core busy.
     let ends = cases.into_par_iter().with_max_len(1).map(|(case @ ((_, shape), averaged, (poisson, _)), n)| {
         (case, n, membrane(shape, *poisson, n, averaged).map_err(|error| chain(&*error)))

@@ -17,7 +17,8 @@ use bfree::solver::{Forcing, NewtonSettings};
 use bfree::tensor::Vector;
 
 /// The summary in the list of studies.
-pub(super) const ABOUT: &str = "orders in space on a vortex and on an axis-aligned motion, the grid renewed in every step";
+pub(super) const ABOUT: &str =
+    "orders in space on a vortex and on an axis-aligned motion, the grid renewed in every step";
 
 /// Particles along each axis of a cell.
 const PER_AXIS: u32 = 2;
@@ -129,16 +130,21 @@ fn simulate<P: Problem>(
     } else {
         Vec::new()
     };
-    let bodies = vec![Body { name: "body".into(), law: law.clone(), density, dilatation: Default::default(), field: 0 }];
-    let mut simulation = Simulation { loads: Loads {
+    let bodies =
+        vec![Body { name: "body".into(), law: law.clone(), density, dilatation: Default::default(), field: 0 }];
+    let mut simulation = Simulation {
+        loads: Loads {
             prescribed,
             field: Some(force_field(*problem, law, density, reference.clone())),
             ..Loads::default()
-        }, settings: Settings {
+        },
+        settings: Settings {
             wall_update: WallUpdate::Consistent,
             newton: NewtonSettings { forcing: Forcing::Fixed(1e-3), ..NewtonSettings::default() },
             ..Settings::default()
-        }, ..Simulation::new(grid, shape.clone(), bodies, particles, Clock::new(1.0 / f64::from(steps), 0)) };
+        },
+        ..Simulation::new(grid, shape.clone(), bodies, particles, Clock::new(1.0 / f64::from(steps), 0))
+    };
     for _ in 0..steps {
         simulation.step()?;
     }

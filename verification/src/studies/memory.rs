@@ -6,7 +6,7 @@
 use super::{Effort, Outcome, StudyError, worse};
 use crate::random::Random;
 use crate::report::{Bound, Report};
-use bfree::material::{DISSIPATED, Lame, Law, Material, PLASTIC_STRAIN, MaterialState, internal_variable};
+use bfree::material::{DISSIPATED, Lame, Law, Material, MaterialState, PLASTIC_STRAIN, internal_variable};
 use bfree::tensor::{Tensor, contract, identity, inverse};
 use num_dual::{Dual2_64, Dual64};
 

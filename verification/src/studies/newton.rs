@@ -4,8 +4,8 @@ use super::{Effort, Outcome, StudyError};
 use crate::report::{Bound, Report, short};
 use crate::shipped;
 use crate::table::Table;
-use bfree::mechanics::residual::Equilibrium;
 use bfree::material::Material;
+use bfree::mechanics::residual::Equilibrium;
 use bfree::pooled::Pool;
 use bfree::simulation::{AdvanceError, Simulation};
 use bfree::solver::{
@@ -13,7 +13,8 @@ use bfree::solver::{
 };
 use bfree::tensor::Vector;
 
-pub(super) const ABOUT: &str = "observed orders of Newton's method on steps of the rebound, and where contact with friction begins and ends";
+pub(super) const ABOUT: &str =
+    "observed orders of Newton's method on steps of the rebound, and where contact with friction begins and ends";
 
 /// A step of a scene, started from the converged state before it.
 struct Case {
@@ -242,7 +243,9 @@ impl Study {
     }
 
     fn outcome(mut self) -> Outcome {
-        self.converged.note(format!("Bound: {ROUND_OFF} eps times the magnitude, where Newton's method itself calls a residual round-off."));
+        self.converged.note(format!(
+            "Bound: {ROUND_OFF} eps times the magnitude, where Newton's method itself calls a residual round-off."
+        ));
         self.orders.note("Least squares on the half of the points nearer to the solution, down to round-off.");
         let remarks = vec![
             "Quadratic: every step shown with the exact tangent and a tight linear solve. A single Newton step has order 2 wherever its result is above round-off, for every eps.".into(),
@@ -290,8 +293,8 @@ fn order(pairs: &[(f64, f64)]) -> Option<f64> {
     let n = pairs.len() as f64;
     let points: Vec<(f64, f64)> = pairs.iter().map(|(x, y)| (x.ln(), y.ln())).collect();
     let (x_mean, y_mean) = points.iter().fold((0.0, 0.0), |(a, b), (x, y)| (a + x / n, b + y / n));
-    let (xy, xx) = points.iter().fold((0.0, 0.0), |(a, b), (x, y)| {
-        (a + (x - x_mean) * (y - y_mean), b + (x - x_mean) * (x - x_mean))
-    });
+    let (xy, xx) = points
+        .iter()
+        .fold((0.0, 0.0), |(a, b), (x, y)| (a + (x - x_mean) * (y - y_mean), b + (x - x_mean) * (x - x_mean)));
     (pairs.len() >= 3 && xx > 0.0).then(|| xy / xx)
 }

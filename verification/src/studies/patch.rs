@@ -7,12 +7,12 @@ use crate::report::{Bound, Report};
 use bfree::approximation::Approximation;
 use bfree::clock::Clock;
 use bfree::grid::Grid;
-use bfree::material::{Lame, Law, Material, NeoHookean, MaterialState};
+use bfree::material::{Lame, Law, Material, MaterialState, NeoHookean};
 use bfree::mechanics::loads::Loads;
 use bfree::mechanics::residual::Equilibrium;
+use bfree::mechanics::schemes::{Alphas, Newmark, Scheme, Statics};
 use bfree::mechanics::sweep::Supports;
 use bfree::mechanics::terms::Step;
-use bfree::mechanics::schemes::{Alphas, Newmark, Scheme, Statics};
 use bfree::mechanics::transfer::{Nodal, Update, WallUpdate};
 use bfree::particles::{Body, Particles};
 use bfree::simulation::{InitialGuess, Settings, Simulation};
@@ -38,8 +38,12 @@ fn families() -> Vec<(&'static str, Approximation)> {
 }
 
 pub(super) fn run(_effort: &Effort) -> Result<Outcome, StudyError> {
-    let mut affine = Report::new("affine motion, random layouts with points on nodes, faces, walls and corners", &["quantity", "shape", "D"]);
-    let mut shapes = Report::new("shape functions, worst place", &["quantity", "D", "place", "shape"]).as_matrix(&[0, 1], 3, 2);
+    let mut affine = Report::new(
+        "affine motion, random layouts with points on nodes, faces, walls and corners",
+        &["quantity", "shape", "D"],
+    );
+    let mut shapes =
+        Report::new("shape functions, worst place", &["quantity", "D", "place", "shape"]).as_matrix(&[0, 1], 3, 2);
     for (name, shape) in &families() {
         for cell in check_approximation(shape).cells() {
             let labels: Vec<&str> = cell.labels.iter().map(String::as_str).chain([*name]).collect();
@@ -79,7 +83,13 @@ fn layout<const D: usize>(grid: &Grid<D>, count: usize, random: &mut Random) -> 
                 match (k % 9, (k / 9 + i) % 2) {
                     (0, 0) | (1, _) => s.floor(),
                     (2, 0) => 0.0,
-                    (3, _) => if s < 0.5 * last { 0.0 } else { last },
+                    (3, _) => {
+                        if s < 0.5 * last {
+                            0.0
+                        } else {
+                            last
+                        }
+                    }
                     _ => s,
                 }
             });
@@ -245,7 +255,8 @@ pub(super) fn spinning(shape: &Approximation, lumping: f64, dt: f64) -> Result<S
     let mut particles = Particles::default();
     for j in 0..8 {
         for i in 0..8 {
-            let x = Vector::from([f64::from(i), f64::from(j)]) * 0.5 + Vector::from([4.25, 4.25]) + random.vector() * 0.1;
+            let x =
+                Vector::from([f64::from(i), f64::from(j)]) * 0.5 + Vector::from([4.25, 4.25]) + random.vector() * 0.1;
             let r = x - centre;
             // Translation, rotation, and a breathing mode.
             let v = Vector::from([0.3, 0.2]) + Vector::from([-r[1], r[0]]) * 0.5 + r * 0.2;
@@ -255,7 +266,8 @@ pub(super) fn spinning(shape: &Approximation, lumping: f64, dt: f64) -> Result<S
     let law = Material::from(NeoHookean::ciarlet(Lame::new(15.0, 10.0)?));
     let grid = Grid { origin: Vector::zeros(), spacing: 1.0, cells: [12, 12] };
     let bodies = vec![Body { name: "square".into(), law, density: 4.0, dilatation: Default::default(), field: 0 }];
-    Ok(Simulation { settings: Settings {
+    Ok(Simulation {
+        settings: Settings {
             lumping,
             initial_guess: InitialGuess::Velocity,
             newton: NewtonSettings {
@@ -264,7 +276,9 @@ pub(super) fn spinning(shape: &Approximation, lumping: f64, dt: f64) -> Result<S
                 ..NewtonSettings::default()
             },
             ..Settings::default()
-        }, ..Simulation::new(grid, shape.clone(), bodies, particles, Clock::new(dt, 0)) })
+        },
+        ..Simulation::new(grid, shape.clone(), bodies, particles, Clock::new(dt, 0))
+    })
 }
 
 /// Σ m x × v about the centre of mass.

@@ -21,8 +21,10 @@ const SHAPES: [(&str, &str); 3] = [
 ];
 
 /// The trapezoidal rule and the paper's damped one.
-const RULES: [(&str, [&str; 2]); 2] =
-    [("trapezoidal", ["time.gamma=0.5", "time.beta=0.25"]), ("gamma 0.6, beta 0.3", ["time.gamma=0.6", "time.beta=0.3"])];
+const RULES: [(&str, [&str; 2]); 2] = [
+    ("trapezoidal", ["time.gamma=0.5", "time.beta=0.25"]),
+    ("gamma 0.6, beta 0.3", ["time.gamma=0.6", "time.beta=0.3"]),
+];
 
 /// The energy before the first impact.
 const ENERGY: f64 = 3.5;

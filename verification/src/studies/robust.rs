@@ -16,7 +16,8 @@ use serde_json::{Value, json};
 use snap::snap_through;
 
 /// The summary in the list of studies.
-pub(super) const ABOUT: &str = "linear iterations against refinement, cuts, time steps, ν and contrast, with multigrid; and a path that turns";
+pub(super) const ABOUT: &str =
+    "linear iterations against refinement, cuts, time steps, ν and contrast, with multigrid; and a path that turns";
 
 /// The most linear iterations per Newton iteration in 2D and in 3D, and the largest growth by the last refinement.
 const MOST: [f64; 2] = [20.0, 30.0];
@@ -71,7 +72,8 @@ enum Shape {
 }
 
 impl Shape {
-    const ALL: [(Self, &'static str); 3] = [(Self::Block, "block"), (Self::Ball, "ball"), (Self::Turned, "turned block")];
+    const ALL: [(Self, &'static str); 3] =
+        [(Self::Block, "block"), (Self::Ball, "ball"), (Self::Turned, "turned block")];
 }
 
 /// The scene with replaced keys.

@@ -6,7 +6,8 @@ use crate::symmetry::{SymmetryError, TRANSFORMATIONS, Transformation, compare, d
 use rayon::prelude::*;
 
 /// The summary in the list of studies.
-pub(super) const ABOUT: &str = "random scenes and their mirror images, turned, moved, halved, split, thickened and scaled";
+pub(super) const ABOUT: &str =
+    "random scenes and their mirror images, turned, moved, halved, split, thickened and scaled";
 
 /// The number of scenes for each transformation.
 fn scenes(effort: Effort) -> u64 {
@@ -25,7 +26,10 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
         &["transformation", "of", "scene"],
     )
     .as_matrix(&[1], 0, 2);
-    let mut left_out = Report::new("share of the scenes, and of the images of other scenes, that could not be run", &["transformation", "of"]);
+    let mut left_out = Report::new(
+        "share of the scenes, and of the images of other scenes, that could not be run",
+        &["transformation", "of"],
+    );
     for transformation in TRANSFORMATIONS {
         judge(transformation, scenes(*effort), &mut report, &mut left_out);
     }
@@ -46,7 +50,8 @@ fn judge(transformation: Transformation, scenes: u64, report: &mut Report, left_
             Ok(found) => {
                 for one in found {
                     // The bits either agree or do not.
-                    let (value, bound) = if pair_of_bits(transformation) { (one.difference, 0.0) } else { (one.used(), 1.0) };
+                    let (value, bound) =
+                        if pair_of_bits(transformation) { (one.difference, 0.0) } else { (one.used(), 1.0) };
                     report.push(&[transformation.name(), one.quantity, &name], value, Bound::AtMost(bound));
                 }
             }

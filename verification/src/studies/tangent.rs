@@ -10,17 +10,18 @@ use bfree::approximation::Approximation;
 use bfree::clock::Clock;
 use bfree::grid::Grid;
 use bfree::material::{Energy, FromEnergy, Lame, LameError, Law, Material};
+use bfree::mechanics::loads::Rayleigh;
 use bfree::mechanics::loads::{
     Curve, Gravity, Loads, Motion, Prescribed, Pressing, Selection, SurfaceLoad, SurfacePoint,
 };
 use bfree::mechanics::sweep::Supports;
-use bfree::mechanics::loads::Rayleigh;
 use bfree::particles::{Body, Dilatation, Particles};
 use bfree::scalar::Real;
 use bfree::simulation::{Settings, Simulation};
 use bfree::tensor::{Deformation, Tensor, Vector, contract, determinant, trace};
 
-pub(super) const ABOUT: &str = "every term of the tangent against dual numbers, for every law, shape function, dimension, regime";
+pub(super) const ABOUT: &str =
+    "every term of the tangent against dual numbers, for every law, shape function, dimension, regime";
 
 pub(super) const YOUNG: f64 = 1000.0;
 pub(super) const SPACING: f64 = 0.5;
@@ -36,7 +37,8 @@ impl Energy for Murnaghan {
     fn energy<T: Real>(&self, e: &Tensor<T, 3>) -> T {
         let Lame { lambda, shear } = self.lame;
         let (t, ee) = (trace(e), contract(e, e));
-        let third = t * t * t * T::lit(0.3 * shear) + t * ee * T::lit(0.2 * shear) + determinant(e) * T::lit(0.7 * shear);
+        let third =
+            t * t * t * T::lit(0.3 * shear) + t * ee * T::lit(0.2 * shear) + determinant(e) * T::lit(0.7 * shear);
         t * t * T::lit(0.5 * lambda) + ee * T::lit(shear) + third
     }
 }
@@ -190,8 +192,7 @@ pub(super) fn cloud<const D: usize, L: Law>(
     let mut points = Vec::new();
     for p in 0..per_axis.pow(D as u32) {
         let index: [usize; D] = std::array::from_fn(|k| p / per_axis.pow(k as u32) % per_axis);
-        let position =
-            Vector::from_fn(|k, _| (index[k] as f64 + 0.5 + 0.3 * random.signed()) * distance);
+        let position = Vector::from_fn(|k, _| (index[k] as f64 + 0.5 + 0.3 * random.signed()) * distance);
         let volume = distance.powi(D as i32) * random.between(0.7, 1.3);
         particles.push(position, random.vector() * speed, volume, density * volume, 0);
         particles.acceleration[p] = random.vector() * (speed / dt);
@@ -205,23 +206,19 @@ pub(super) fn cloud<const D: usize, L: Law>(
     motion[0] = Some(Motion::Rest);
     let grid = Grid { origin: Vector::zeros(), spacing: SPACING, cells: [6; D] };
     let bodies = vec![Body { name: "cloud".into(), law, density, dilatation: Default::default(), field: 0 }];
-    Ok(Simulation { loads: Loads {
+    Ok(Simulation {
+        loads: Loads {
             gravity: Some(Gravity { acceleration: random.vector() * (speed / dt), curve: Curve::constant(1.0) }),
             surface: vec![SurfaceLoad {
                 pressing: Pressing::Pressure(0.1 * YOUNG),
                 curve: Curve::constant(1.0),
                 points,
             }],
-            prescribed: vec![Prescribed {
-                name: "wall".into(),
-                on: Selection::Face { axis: 0, upper: false },
-                motion,
-            }],
+            prescribed: vec![Prescribed { name: "wall".into(), on: Selection::Face { axis: 0, upper: false }, motion }],
             damping: Some(Rayleigh { mass: 0.4 / dt, stiffness: 0.3 * dt }),
             ..Loads::default()
         }, // Not a half, where ε and 1 − ε are the same.
-        settings: Settings {
-            lumping: 0.3,
-            ..Settings::default()
-        }, ..Simulation::new(grid, approximation, bodies, particles, Clock::new(dt, 0)) })
+        settings: Settings { lumping: 0.3, ..Settings::default() },
+        ..Simulation::new(grid, approximation, bodies, particles, Clock::new(dt, 0))
+    })
 }

@@ -67,7 +67,8 @@ fn impact(cells: u32) -> Result<Impact, StudyError> {
 }
 
 pub(super) fn report(effort: &Effort) -> Result<(Report, Table), StudyError> {
-    let mut report = Report::new("impact of a bar on a wall: errors relative to the exact values", &["cells", "quantity"]);
+    let mut report =
+        Report::new("impact of a bar on a wall: errors relative to the exact values", &["cells", "quantity"]);
     let mut table = Table::new(
         "impact of a bar on a wall",
         ["cells", "time of release", "mean force", "deviation of the force", "rebound", "energy lost"],

@@ -82,8 +82,13 @@ fn on_slope(shape: Value, degrees: f64, friction: f64) -> Value {
 pub(super) fn slope(effort: &Effort) -> Result<Report, StudyError> {
     let title = "a disc and a block on a deformable slope: error of the acceleration over g sin θ";
     let mut report = Report::new(title, &["body", "θ", "μ"]);
-    let (disc, block) = (json!({ "ball": { "center": [0.7, 1.5], "radius": 0.5 } }), json!({ "box": { "min": [0.2, 1], "max": [1.2, 1.5] } }));
-    for (degrees, friction) in if *effort == Effort::Full { vec![(20.0_f64, 0.5_f64), (20.0, 0.1)] } else { vec![(20.0, 0.1)] } {
+    let (disc, block) = (
+        json!({ "ball": { "center": [0.7, 1.5], "radius": 0.5 } }),
+        json!({ "box": { "min": [0.2, 1], "max": [1.2, 1.5] } }),
+    );
+    for (degrees, friction) in
+        if *effort == Effort::Full { vec![(20.0_f64, 0.5_f64), (20.0, 0.1)] } else { vec![(20.0, 0.1)] }
+    {
         let g = super::incline::GRAVITY;
         let (sine, cosine) = degrees.to_radians().sin_cos();
         let slides = g * (sine - friction * cosine);
@@ -119,7 +124,8 @@ fn rebound(scene: &Value, force: impl Fn(&bfree::simulation::StepReport<2>) -> f
 
 /// Two equal discs that meet head-on, and one of them on a smooth rigid wall of twice the penalty stiffness, which is the same problem.
 pub(super) fn mirrored(effort: &Effort) -> Result<Report, StudyError> {
-    let mut report = Report::new("two discs that meet, beside one disc on a wall: relative differences", &["functions", "quantity"]);
+    let mut report =
+        Report::new("two discs that meet, beside one disc on a wall: relative differences", &["functions", "quantity"]);
     let disc = |name: &str, x: f64, speed: f64| {
         json!({ "name": name, "density": 1, "velocity": [speed, 0], "shape": { "ball": { "center": [x, 2.5], "radius": 1 } },
                 "material": { "neo_hookean": { "young": 1000, "poisson": 0.3 } } })

@@ -44,7 +44,8 @@ fn ball<const D: usize>(spacing: f64, step: f64) -> Result<[f64; 2], StudyError>
         }
         rises = rising;
     }
-    let energy = simulation.particles.kinetic_energy() + simulation.strain_energy() + mass * GRAVITY * height(&simulation);
+    let energy =
+        simulation.particles.kinetic_energy() + simulation.strain_energy() + mass * GRAVITY * height(&simulation);
     Ok([first / DROP, 1.0 - energy / (mass * GRAVITY * DROP)])
 }
 
@@ -55,7 +56,8 @@ pub(super) fn report(effort: &Effort) -> Result<Report, StudyError> {
     let mut report = Report::new("a ball that bounces five times, with all defaults", &["D", "h", "quantity"]);
     let mut add = |dimension: &str, spacing: f64, [first, lost]: [f64; 2], converged: Option<f64>| {
         let labels = |quantity| [dimension.to_owned(), spacing.to_string(), String::from(quantity)];
-        let mut push = |quantity, value, bound| report.push(&labels(quantity).each_ref().map(String::as_str), value, bound);
+        let mut push =
+            |quantity, value, bound| report.push(&labels(quantity).each_ref().map(String::as_str), value, bound);
         push("energy lost", lost, Bound::AtMost(0.15));
         push("energy gained", -lost, Bound::AtMost(0.0));
         if let Some(converged) = converged {

@@ -33,7 +33,10 @@ fn largest(ratio: f64, spacing: f64) -> Result<f64, StudyError> {
 }
 
 pub(super) fn report(effort: &Effort) -> Result<Report, StudyError> {
-    let mut report = Report::new("a block dragged over a base: tangential over normal force", &["stiffness of the base", "h", "quantity"]);
+    let mut report = Report::new(
+        "a block dragged over a base: tangential over normal force",
+        &["stiffness of the base", "h", "quantity"],
+    );
     let ratios = if *effort == Effort::Full { vec![1000.0, 10.0, 1.0] } else { vec![1000.0] };
     for ratio in ratios {
         for spacing in if *effort == Effort::Full { vec![0.125, 0.0625] } else { vec![0.125] } {
@@ -44,6 +47,8 @@ pub(super) fn report(effort: &Effort) -> Result<Report, StudyError> {
             push("below μ", 1.0 - found / FRICTION, Bound::AtMost(0.01));
         }
     }
-    report.note("Bound: the normals of a base that bends differ from the vertical. Every point keeps Coulomb's cone exactly.");
+    report.note(
+        "Bound: the normals of a base that bends differ from the vertical. Every point keeps Coulomb's cone exactly.",
+    );
     Ok(report)
 }

@@ -44,7 +44,8 @@ fn impact(scene: &Value, end: f64) -> Result<Impact, StudyError> {
 
 /// The disc of `disc_on_wall.py`, with the same penalty on every grid.
 pub(super) fn beside_elements(effort: &Effort) -> Result<Report, StudyError> {
-    let mut report = Report::new("a disc on a wall, beside finite elements: relative differences", &["cells in R", "quantity"]);
+    let mut report =
+        Report::new("a disc on a wall, beside finite elements: relative differences", &["cells in R", "quantity"]);
     for cells in if *effort == Effort::Full { vec![8, 16] } else { vec![8] } {
         let h = 1.0 / f64::from(cells);
         let scene = json!({
@@ -86,7 +87,11 @@ pub(super) fn of_the_paper(effort: &Effort) -> Result<Report, StudyError> {
         report.push(&[&name, "rebound above 1"], found.rebound - 1.0, Bound::AtMost(0.0));
         report.push(&[&name, "energy lost"], found.lost, Bound::Reported);
         if let Some(coarser) = coarser.replace(found.lost) {
-            report.push(&[&name, "energy lost over that of the coarser grid"], found.lost / coarser, Bound::AtMost(1.0));
+            report.push(
+                &[&name, "energy lost over that of the coarser grid"],
+                found.lost / coarser,
+                Bound::AtMost(1.0),
+            );
         }
     }
     report.note("Bounds: issue 39 of the project. A step sees the contact at its end, so a force within one step of touching is in the second step at most.");

@@ -59,7 +59,8 @@ fn bar(effort: &Effort) -> Result<Report, StudyError> {
 
 /// A rigid disc on an elastic slab under tilted gravity rolls with ⅔ g sin θ.
 fn rolling() -> Result<Report, StudyError> {
-    let mut report = Report::new("a rigid disc rolls on an elastic slab: error of the acceleration over g sin θ", &["θ", "μ"]);
+    let mut report =
+        Report::new("a rigid disc rolls on an elastic slab: error of the acceleration over g sin θ", &["θ", "μ"]);
     for (degrees, friction) in [(20.0_f64, 0.5), (45.0, 0.2)] {
         let angle = degrees.to_radians();
         let scene: Value = json!({

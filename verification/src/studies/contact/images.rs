@@ -74,7 +74,11 @@ fn scene(random: &mut Random) -> Scene {
         }
     };
     let bodies = (0..3).map(body).collect();
-    Scene { bodies, friction: if random.signed() > 0.0 { 0.0 } else { random.between(0.1, 0.6) }, gravity: random.between(0.0, 10.0) }
+    Scene {
+        bodies,
+        friction: if random.signed() > 0.0 { 0.0 } else { random.between(0.1, 0.6) },
+        gravity: random.between(0.0, 10.0),
+    }
 }
 
 impl Image {
@@ -87,7 +91,10 @@ impl Image {
         let body = |&i: &usize| {
             let Body { outline, radius, velocity, young } = &scene.bodies[i];
             let at: Vec<Point> = outline.iter().map(|&x| self.at(x)).collect();
-            let shape = radius.map_or_else(|| json!({ "polygon": at }), |radius| json!({ "ball": { "center": at[0], "radius": radius } }));
+            let shape = radius.map_or_else(
+                || json!({ "polygon": at }),
+                |radius| json!({ "ball": { "center": at[0], "radius": radius } }),
+            );
             json!({ "name": format!("body {i}"), "density": 1, "velocity": (self.map)(*velocity), "shape": shape,
                     "material": { "neo_hookean": { "young": young, "poisson": 0.3 } } })
         };
@@ -134,7 +141,8 @@ fn end(image: &Image, scene: &Scene) -> Result<Option<End>, StudyError> {
 
 pub(super) fn report(effort: &Effort) -> Result<Report, StudyError> {
     let count = if *effort == Effort::Full { 60 } else { 1 };
-    let title = "random scenes with contact and their images: largest difference of a momentum, over the largest momentum";
+    let title =
+        "random scenes with contact and their images: largest difference of a momentum, over the largest momentum";
     let mut report = Report::new(title, &["seed", "image"]);
     let run = |seed: u64| {
         let scene = scene(&mut Random::new(seed));
@@ -161,7 +169,9 @@ pub(super) fn report(effort: &Effort) -> Result<Report, StudyError> {
             report.push(&labels, apart.fold(0.0, f64::max) / scale, Bound::AtMost(1e-7));
         }
     }
-    report.note("Bound: the tolerance of Newton's method, 1e-12, times the growth of a difference in 30 steps with impacts.");
+    report.note(
+        "Bound: the tolerance of Newton's method, 1e-12, times the growth of a difference in 30 steps with impacts.",
+    );
     report.note("Books: the dissipated energy less the friction losses of all obstacles and pairs, relative to it.");
     Ok(report)
 }

@@ -27,7 +27,9 @@ pub(super) fn scene(shape: Value, degrees: f64, friction: f64) -> Value {
 /// The mean acceleration along the floor between the two times.
 pub(super) fn acceleration(scene: &Value) -> Result<f64, StudyError> {
     let mut simulation = built::<2>(scene)?;
-    let own = |simulation: &Simulation<2>| (0..simulation.particles.len()).filter(|&p| simulation.particles.body[p] == 0).collect::<Vec<_>>();
+    let own = |simulation: &Simulation<2>| {
+        (0..simulation.particles.len()).filter(|&p| simulation.particles.body[p] == 0).collect::<Vec<_>>()
+    };
     let [start, end] = TIMES.map(|until| -> Result<[f64; 2], StudyError> {
         while simulation.clock.time() < until - 1e-9 {
             simulation.advance()?;
@@ -43,7 +45,8 @@ pub(super) fn acceleration(scene: &Value) -> Result<f64, StudyError> {
 }
 
 pub(super) fn report(effort: &Effort) -> Result<Report, StudyError> {
-    let mut report = Report::new("a disc and a block on an incline: error of the acceleration over g sin θ", &["body", "θ", "μ"]);
+    let mut report =
+        Report::new("a disc and a block on an incline: error of the acceleration over g sin θ", &["body", "θ", "μ"]);
     let disc = json!({ "ball": { "center": [0.7, 1.5], "radius": 0.5 } });
     let block = json!({ "box": { "min": [0.2, 1], "max": [1.2, 1.5] } });
     let cases: [(f64, f64); 4] = [(20.0, 0.5), (20.0, 0.1), (45.0, 0.5), (45.0, 0.2)];

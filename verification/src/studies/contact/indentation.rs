@@ -21,7 +21,8 @@ fn vertical_stress(law: &Material, h: &Tensor<f64, 2>) -> f64 {
 
 /// A block that is free to widen is pressed by 1e-4 of its height: all stresses are those of uniaxial stress in plane strain.
 pub(super) fn patch() -> Result<Report, StudyError> {
-    let mut report = Report::new("patch test: error of the stress, worst particle", &["functions", "side of the block"]);
+    let mut report =
+        Report::new("patch test: error of the stress, worst particle", &["functions", "side of the block"]);
     for functions in ["linear", "cubic"] {
         let approximation = if functions == "linear" { json!("linear") } else { json!({ "bspline": { "degree": 3 } }) };
         // On the grid, and with cut cells.

@@ -20,7 +20,9 @@ fn pile(tip: &str) -> Value {
     match tip {
         "flat" => json!({ "box": { "min": [x - 0.5, y], "max": [x + 0.5, y + 9.0] } }),
         "round" => json!({ "union": [shaft, { "ball": { "center": [x, y + 0.5], "radius": 0.5 } }] }),
-        _ => json!({ "polygon": [[x, y], [x + 0.5, y + 0.5], [x + 0.5, y + 9.0], [x - 0.5, y + 9.0], [x - 0.5, y + 0.5]] }),
+        _ => {
+            json!({ "polygon": [[x, y], [x + 0.5, y + 0.5], [x + 0.5, y + 9.0], [x - 0.5, y + 9.0], [x - 0.5, y + 0.5]] })
+        }
     }
 }
 
@@ -62,7 +64,11 @@ pub(super) fn report(effort: &Effort) -> Result<Report, StudyError> {
         report.push(&[tip, &spacing.to_string(), "deepest particle in h"], deepest, Bound::AtMost(0.1));
         if tip == "flat" {
             let prandtl = 2.0 + std::f64::consts::PI;
-            report.push(&[tip, &spacing.to_string(), "least bearing factor over this one"], prandtl / factor, Bound::AtMost(1.0));
+            report.push(
+                &[tip, &spacing.to_string(), "least bearing factor over this one"],
+                prandtl / factor,
+                Bound::AtMost(1.0),
+            );
         }
     }
     report.note("Bounds: issue 52 of the project for the depth, and Prandtl's 2 + π of a punch at the surface for the bearing factor.");

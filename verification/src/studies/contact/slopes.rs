@@ -35,7 +35,10 @@ fn block(random: &mut Random, used: f64, stiffest: f64) -> Block {
     let [length, height, x] = [random.between(0.5, 1.2), random.between(0.25, 0.6), random.between(0.2, 0.4)];
     let speed = (young * (1.0 - poisson) / ((1.0 + poisson) * (1.0 - 2.0 * poisson) * DENSITY)).sqrt();
     let (step, loaded) = (random.between(1.0, 3.0) * SPACING / speed, RISE * height / speed);
-    let rise: Vec<_> = (0..=20).map(|i| f64::from(i) / 20.0).map(|s| [s * loaded, 0.5 - 0.5 * (std::f64::consts::PI * s).cos()]).collect();
+    let rise: Vec<_> = (0..=20)
+        .map(|i| f64::from(i) / 20.0)
+        .map(|s| [s * loaded, 0.5 - 0.5 * (std::f64::consts::PI * s).cos()])
+        .collect();
     let scene = json!({
         "grid": { "size": [5, 2.5], "spacing": SPACING },
         "time": { "step": step, "end": loaded + 1.0 },
@@ -93,8 +96,12 @@ pub(super) fn reports(effort: &Effort) -> Result<Vec<Report>, StudyError> {
     let full = *effort == Effort::Full;
     // Stiff blocks need many steps.
     let (count, stiffest) = if full { (200, 8.0) } else { (2, 6.5) };
-    let mut rest = Report::new("random blocks below 0.99 of Coulomb's limit, one second after the load is on", &["seed", "quantity"]);
-    let mut slide = Report::new("random blocks above 1.01 of Coulomb's limit: error of the acceleration over g sin θ", &["seed"]);
+    let mut rest = Report::new(
+        "random blocks below 0.99 of Coulomb's limit, one second after the load is on",
+        &["seed", "quantity"],
+    );
+    let mut slide =
+        Report::new("random blocks above 1.01 of Coulomb's limit: error of the acceleration over g sin θ", &["seed"]);
     let resting = |seed: u64| {
         let mut random = Random::new(seed);
         let used = random.between(0.3, 0.99);

@@ -9,7 +9,7 @@ use crate::studies::StudyError;
 use crate::studies::tangent::{SPACING, cloud};
 use bfree::approximation::{Approximation, Bspline};
 use bfree::material::{Lame, Material, NeoHookean};
-use bfree::mechanics::loads::{BodyContact, Curve, Candidate, Motion, Obstacle, RigidBody, Rotation, Share};
+use bfree::mechanics::loads::{BodyContact, Candidate, Curve, Motion, Obstacle, RigidBody, Rotation, Share};
 use bfree::shape::{Ball, Block, Cone, HalfSpace, Shape};
 use bfree::simulation::Simulation;
 use bfree::tensor::{Tensor, Vector};
@@ -119,17 +119,23 @@ fn between<const D: usize>(
         let of_after = Share { number: after, share: 0.4, offset: rest / 0.4 - x(after) };
         let slip = random.vector() * (slip * SPACING);
         let (part, edges, closest) = (0.8, [0.3, 0.6], vec![of_after, of_before]);
-        between.candidates.push(Candidate { number, pair: 0, part, edges, is_first: true, normal, start, slip, closest });
+        between.candidates.push(Candidate {
+            number,
+            pair: 0,
+            part,
+            edges,
+            is_first: true,
+            normal,
+            start,
+            slip,
+            closest,
+        });
     }
     between
 }
 
 /// A rigid body that turns about `center`, in the midst of a turn. Its mass resists as much as all points of contact.
-fn free<const D: usize>(
-    simulation: &Simulation<D>,
-    center: Vector<f64, D>,
-    random: &mut Random,
-) -> RigidBody<D> {
+fn free<const D: usize>(simulation: &Simulation<D>, center: Vector<f64, D>, random: &mut Random) -> RigidBody<D> {
     let area: f64 = simulation.loads.contacts.points.iter().map(|point| point.area).sum();
     let stiffness = bfree::material::p_wave_modulus(&simulation.bodies[0].law) / simulation.grid.spacing;
     let mass = area * stiffness / simulation.settings.scheme.end(simulation.clock.step()).a1;
@@ -151,7 +157,8 @@ fn turning<const D: usize>(center: Vector<f64, D>) -> Motion<D> {
 
 pub(super) fn reports() -> Result<Vec<Report>, StudyError> {
     let columns = ["quantity", "obstacle", "D", "state", "motion"];
-    let mut report = Report::new("tangent of contact: |K u - dual(R) u| / |K u|, bound min(64 eps k(F)^2, 1e-10)", &columns);
+    let mut report =
+        Report::new("tangent of contact: |K u - dual(R) u| / |K u|, bound min(64 eps k(F)^2, 1e-10)", &columns);
     dimension::<1>(&mut report)?;
     dimension::<2>(&mut report)?;
     dimension::<3>(&mut report)?;

@@ -27,7 +27,13 @@ pub(super) fn left_by_newton<const D: usize>(settings: &Settings, step: &StepRep
 
 /// A body of Ciarlet's law.
 pub(super) fn body(lame: Lame, density: f64) -> Body<Material> {
-    Body { name: "body".into(), law: NeoHookean::ciarlet(lame).into(), density, dilatation: Default::default(), field: 0 }
+    Body {
+        name: "body".into(),
+        law: NeoHookean::ciarlet(lame).into(),
+        density,
+        dilatation: Default::default(),
+        field: 0,
+    }
 }
 
 /// Λ = G = 1, ρ = 1: a speed of sound of √3.

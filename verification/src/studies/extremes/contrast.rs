@@ -46,7 +46,12 @@ pub(super) fn run() -> Result<Report, StudyError> {
 }
 
 /// A block that fills its box, pressed by one wall in one long step. H is uniform, and the force of the wall follows from the law.
-fn confined<const D: usize>(poisson: f64, name: &str, shape: &Approximation, report: &mut Report) -> Result<(), StudyError> {
+fn confined<const D: usize>(
+    poisson: f64,
+    name: &str,
+    shape: &Approximation,
+    report: &mut Report,
+) -> Result<(), StudyError> {
     const CELLS: u32 = 3;
     let lame = Lame::from_young_poisson(1.0, poisson)?;
     let grid = Grid { origin: Vector::zeros(), spacing: 1.0, cells: [CELLS; D] };
@@ -75,7 +80,13 @@ fn confined<const D: usize>(poisson: f64, name: &str, shape: &Approximation, rep
     match reaction {
         Ok(reaction) => {
             solvable(report, &what, &format!("{case}: H"), Ok::<_, StepError>(strains), bound);
-            solvable(report, &what, &format!("{case}: reaction"), Ok::<_, StepError>(reaction), ROUNDINGS * f64::EPSILON);
+            solvable(
+                report,
+                &what,
+                &format!("{case}: reaction"),
+                Ok::<_, StepError>(reaction),
+                ROUNDINGS * f64::EPSILON,
+            );
         }
         Err(_) => solvable(report, &what, &case, stepped.map(|_| f64::NAN), bound),
     }
@@ -83,7 +94,12 @@ fn confined<const D: usize>(poisson: f64, name: &str, shape: &Approximation, rep
 }
 
 /// A free block that vibrates without change of volume to first order.
-fn vibrating<const D: usize>(poisson: f64, name: &str, shape: &Approximation, report: &mut Report) -> Result<(), StudyError> {
+fn vibrating<const D: usize>(
+    poisson: f64,
+    name: &str,
+    shape: &Approximation,
+    report: &mut Report,
+) -> Result<(), StudyError> {
     let lame = Lame::from_young_poisson(1.0, poisson)?;
     let mut simulation = bodies::block::<D>(if D == 3 { 2 } else { 3 }, shape.clone(), 0.2 / lame.shear.sqrt());
     simulation.bodies = vec![body(lame, 1.0)];
@@ -121,9 +137,10 @@ fn in_series(contrast: f64, stiff_last: bool, report: &mut Report) -> Result<(),
     let shortening = 0.1;
     let curve = Curve::new(vec![[0.0, 0.0], [QUASI_STATIC, -shortening]])?;
     simulation.loads.prescribed = vec![normal(0, false, Motion::Rest), normal(0, true, Motion::Displacement(curve))];
-    let exact = series(&simulation.bodies[usize::from(!stiff_last)].law, &simulation.bodies[usize::from(stiff_last)].law, {
-        -0.5 * shortening
-    });
+    let exact =
+        series(&simulation.bodies[usize::from(!stiff_last)].law, &simulation.bodies[usize::from(stiff_last)].law, {
+            -0.5 * shortening
+        });
     let side = if stiff_last { "at the moving wall" } else { "at the resting wall" };
     let what = format!("bars in series, the stiff one {side}");
     let stepped = simulation.step();
@@ -181,7 +198,12 @@ fn pair<const D: usize>(contrast: f64, shape: &Approximation, dt: f64) -> Simula
 }
 
 /// Both blocks fall together, for any masses.
-fn falling<const D: usize>(contrast: f64, name: &str, shape: &Approximation, report: &mut Report) -> Result<(), StudyError> {
+fn falling<const D: usize>(
+    contrast: f64,
+    name: &str,
+    shape: &Approximation,
+    report: &mut Report,
+) -> Result<(), StudyError> {
     let mut simulation = pair::<D>(contrast, shape, 0.1);
     let g: Vector<f64, D> = Vector::from_fn(|k, _| -0.1 - 0.1 * k as f64);
     simulation.loads.gravity = Some(gravity(g));
@@ -200,7 +222,12 @@ fn falling<const D: usize>(contrast: f64, name: &str, shape: &Approximation, rep
 }
 
 /// The heavy block collides with the light one, which is at rest.
-fn colliding<const D: usize>(contrast: f64, name: &str, shape: &Approximation, report: &mut Report) -> Result<(), StudyError> {
+fn colliding<const D: usize>(
+    contrast: f64,
+    name: &str,
+    shape: &Approximation,
+    report: &mut Report,
+) -> Result<(), StudyError> {
     let mut simulation = pair::<D>(contrast, shape, 0.2);
     simulation.clock = Clock::new(0.2, 10);
     for p in 0..simulation.particles.len() {

@@ -81,7 +81,14 @@ fn thrown<const D: usize>(name: &str, shape: &Approximation, report: &mut Report
     simulation.settings.initial_guess = InitialGuess::Velocity;
     simulation.clock = Clock::new(5.0 / speed, 0);
     let what = format!("a body flies 5 cells a step against its wall, {name}, D = {D}");
-    refused(report, &what, "no halving", "Newton(Inadmissible { iteration: 0 })", [simulation.clone().step()], inadmissible);
+    refused(
+        report,
+        &what,
+        "no halving",
+        "Newton(Inadmissible { iteration: 0 })",
+        [simulation.clone().step()],
+        inadmissible,
+    );
     simulation.clock = Clock::new(5.0 / speed, HALVINGS);
     solvable(report, &what, "halved as often as it takes", survive(&mut simulation, 1), 0.0);
 }

@@ -6,19 +6,23 @@ use super::{Outcome, SOLVABLE, refused, rows};
 use crate::check::regime::rotation;
 use crate::random::Random;
 use crate::report::{Bound, Report};
-use bfree::material::{NonPositiveJacobian, MaterialState};
+use bfree::material::{MaterialState, NonPositiveJacobian};
 use bfree::tensor::{Tensor, determinant, identity};
 use std::f64::consts::PI;
 
 pub(super) fn run(outcome: &mut Outcome) {
     let columns = ["quantity", "beforehand", "law", "D", "deformation", "case"];
-    let mut report = Report::new("large deformations: roundings, in eps, that the errors of W and S amount to", &columns)
-        .as_matrix(&[0, 1], 4, 5);
+    let mut report = Report::new(
+        "large deformations: roundings, in eps, that the errors of W and S amount to",
+        &columns,
+    )
+    .as_matrix(&[0, 1], 4, 5);
     dimension::<1>(&mut report);
     dimension::<2>(&mut report);
     dimension::<3>(&mut report);
     report.note("Along the axes F is exact, and an error is judged by a rounding of each of its entries. Where it is turned, and under shear, by");
-    report.note("eps |H| |dS/dH|; where it is stretched and turned, by eps of the products in det F too, which cancel.");
+    report
+        .note("eps |H| |dS/dH|; where it is stretched and turned, by eps of the products in det F too, which cancel.");
     outcome.reports.push(report);
 
     let mut report = rows("deformations no body can have: answers that are not a refusal");
@@ -96,10 +100,12 @@ pub(super) fn bad<const D: usize>() -> Vec<(&'static str, Vec<Tensor<f64, D>>)> 
         f
     };
     let mut random = Random::new(59);
-    let mirrored = (0..50).map(|_| loop {
-        let f = random.tensor::<D>() * 2.0;
-        if determinant(&f) < -0.01 {
-            return f;
+    let mirrored = (0..50).map(|_| {
+        loop {
+            let f = random.tensor::<D>() * 2.0;
+            if determinant(&f) < -0.01 {
+                return f;
+            }
         }
     });
     vec![

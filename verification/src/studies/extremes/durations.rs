@@ -51,7 +51,8 @@ fn vibrating<const D: usize>(name: &str, shape: &Approximation, exponent: i32, r
     let ratio = 10.0_f64.powi(exponent);
     let cells = if D == 3 { 2 } else { 4 };
     let mut simulation = bodies::block::<D>(cells, shape.clone(), ratio / sound);
-    let a = Tensor::<f64, D>::from_fn(|i, k| if i == k { 1.0 - 1.6 * i as f64 } else { 0.3 }) * (MACH * sound / (2.0 * f64::from(cells)));
+    let a = Tensor::<f64, D>::from_fn(|i, k| if i == k { 1.0 - 1.6 * i as f64 } else { 0.3 })
+        * (MACH * sound / (2.0 * f64::from(cells)));
     stir(&mut simulation, &a);
     let start = simulation.particles.clone();
     let scale = sum_of_momenta(&start);
@@ -94,7 +95,13 @@ fn nothing<const D: usize>(name: &str, shape: &Approximation, report: &mut Repor
         f64::from(u8::from(particles.position != start.position) + u8::from(particles.velocity != start.velocity))
             + particles.displacement_gradient.iter().map(Tensor::norm).fold(0.0, worse)
     });
-    solvable(report, &format!("zero velocity, zero gravity, 100 steps, {name}, D = {D}"), "what has changed", changed, 0.0);
+    solvable(
+        report,
+        &format!("zero velocity, zero gravity, 100 steps, {name}, D = {D}"),
+        "what has changed",
+        changed,
+        0.0,
+    );
 }
 
 /// A block under uniform stress that fills its box: a discrete equilibrium in which only round-off moves.
@@ -108,7 +115,8 @@ fn pressed<const D: usize>(name: &str, shape: &Approximation, steps: u32, report
     simulation.loads.prescribed = sliding();
     let start = simulation.particles.clone();
     let rested = (0..steps).try_for_each(|_| simulation.step().map(|_| ()));
-    let (what, sound) = (format!("under stress at rest, {steps} steps, {name}, D = {D}"), PLAIN.p_wave_modulus().sqrt());
+    let (what, sound) =
+        (format!("under stress at rest, {steps} steps, {name}, D = {D}"), PLAIN.p_wave_modulus().sqrt());
     let particles = simulation.particles.by_id();
     let speed = particles.velocity.iter().map(Vector::norm).fold(0.0, worse) / sound;
     let moved = particles.position.iter().zip(&start.position).map(|(x, x_0)| (x - x_0).norm()).fold(0.0, worse);

@@ -19,7 +19,9 @@ const STEP: f64 = 0.1;
 pub(super) fn run(effort: &Effort, outcome: &mut Outcome) -> Result<(), StudyError> {
     let mut report = rows("long free flight and rotation: change of the linear momentum over sum m |v|");
     let long = if *effort == Effort::Full { 100_000 } else { 1000 };
-    for (name, shape, steps) in [("linear", Approximation::from(Linear), 1000), ("LME 3", Lme::new(3.0, 1e-6).into(), long)] {
+    for (name, shape, steps) in
+        [("linear", Approximation::from(Linear), 1000), ("LME 3", Lme::new(3.0, 1e-6).into(), long)]
+    {
         for (motion, spin, breath) in [("rigid", 0.0, 0.0), ("vibrating", 0.0, 0.1), ("rotating", 0.2, 0.0)] {
             flies(name, &shape, motion, (spin, breath), steps, &mut report);
         }
@@ -27,7 +29,9 @@ pub(super) fn run(effort: &Effort, outcome: &mut Outcome) -> Result<(), StudyErr
     outcome.reports.push(report);
 
     let steps = if *effort == Effort::Full { 10_000 } else { 300 };
-    let mut report = rows(&format!("rotation over {steps} steps, the grid kept, midpoint rule, eps = 0: change of the angular momentum over its start"));
+    let mut report = rows(&format!(
+        "rotation over {steps} steps, the grid kept, midpoint rule, eps = 0: change of the angular momentum over its start"
+    ));
     solvable(&mut report, "angular momentum", "linear", spins(&Linear.into(), steps), SPIN);
     outcome.reports.push(report);
     Ok(())

@@ -22,9 +22,16 @@ fn whole_steps<const D: usize>(report: &mut Report) {
             simulation.particles.displacement_gradient[3] = f - identity::<f64, D>();
             simulation.step()
         });
-        refused(report, &format!("a whole step, D = {D}"), case, "Newton(Inadmissible { iteration: 0 })", answers, |error| {
-            matches!(error, StepError::Newton(newton)
+        refused(
+            report,
+            &format!("a whole step, D = {D}"),
+            case,
+            "Newton(Inadmissible { iteration: 0 })",
+            answers,
+            |error| {
+                matches!(error, StepError::Newton(newton)
                 if matches!(&newton.cause, NewtonFailure::Inadmissible { iteration: 0, source } if source.particle == 3))
-        });
+            },
+        );
     }
 }

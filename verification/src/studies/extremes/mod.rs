@@ -22,7 +22,8 @@ use super::{Effort, Outcome, StudyError, worse};
 use crate::report::{Bound, Report, chain};
 
 /// The summary in the list of studies.
-pub(super) const ABOUT: &str = "strains, deformations, contrasts, units, lone particles, time steps and overlaps at their extremes";
+pub(super) const ABOUT: &str =
+    "strains, deformations, contrasts, units, lone particles, time steps and overlaps at their extremes";
 
 /// The entry in the column `beforehand` of a row that must be solved.
 const SOLVABLE: &str = "solvable";

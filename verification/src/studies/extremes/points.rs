@@ -2,7 +2,7 @@
 
 use crate::double_double::DoubleDouble;
 use crate::studies::short;
-use bfree::material::{Lame, Law, Material, MooneyRivlin, NeoHookean, StVenantKirchhoff, MaterialState};
+use bfree::material::{Lame, Law, Material, MaterialState, MooneyRivlin, NeoHookean, StVenantKirchhoff};
 use bfree::scalar::Real;
 use bfree::tensor::{Tensor, Vector, contract, determinant, identity, inverse, outer, scaled, trace};
 use num_traits::Signed;
@@ -83,10 +83,9 @@ pub(super) fn judge<const D: usize>(law: &Material, h: &Tensor<f64, D>, rounding
             let change_w = piola.norm() * h.norm() + contract(&piola, &at.f).abs() * volume;
             (change_w, stiffness * h.norm() + response * volume)
         }
-        Rounding::Entries => (
-            contract(&piola.abs(), &at.f.abs()),
-            pairs().map(|(i, k)| at.f[(i, k)].abs() * response(i, k)).sum(),
-        ),
+        Rounding::Entries => {
+            (contract(&piola.abs(), &at.f.abs()), pairs().map(|(i, k)| at.f[(i, k)].abs() * response(i, k)).sum())
+        }
     };
     let second = 0.5 * (at.f.norm() * stiffness + s.norm()) * (f64::EPSILON * h.norm()).powi(2);
     Errors {
@@ -147,7 +146,8 @@ fn naive<T: Real, const D: usize>(law: &Material, h: &Tensor<T, D>) -> (T, Tenso
             let three = lit(3.0);
             let w = c1 * (first - three) + c2 * (second - three) - lit(2.0) * (c1 + c2 + c2) * ln_j + u;
             let of_c_inverse = lambda * lit(0.5) * (det_c - T::one()) - lit(2.0) * (c1 + c2 + c2);
-            let s = scaled(&one, lit(2.0) * (c1 + c2 * first)) - scaled(&c, c2 + c2) + scaled(&inverse(&c), of_c_inverse);
+            let s =
+                scaled(&one, lit(2.0) * (c1 + c2 * first)) - scaled(&c, c2 + c2) + scaled(&inverse(&c), of_c_inverse);
             return (w, s);
         }
         Material::Ogden(_)

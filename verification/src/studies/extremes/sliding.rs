@@ -27,9 +27,11 @@ pub(super) fn run(outcome: &mut Outcome) -> Result<(), StudyError> {
     let mut report = rows("sliding into the next cells: iterations over those of an overlap of a quarter of a cell");
     let title = "GMRES iterations to 1e-8 with diagonal blocks, against the overlap";
     let mut table = Table::new(title, ["shape", "eps", "overlap", "iterations"]);
-    for (name, shape) in
-        [("linear", Approximation::from(Linear)), ("LME 3", Lme::new(3.0, 1e-6).into()), ("cubic", Bspline::Cubic.into())]
-    {
+    for (name, shape) in [
+        ("linear", Approximation::from(Linear)),
+        ("LME 3", Lme::new(3.0, 1e-6).into()),
+        ("cubic", Bspline::Cubic.into()),
+    ] {
         for lumping in [1.0, 0.1] {
             let reference = solve(&shape, lumping, REFERENCE)?;
             for exponent in [1, 2, 4, 6, 8, 10, 12] {

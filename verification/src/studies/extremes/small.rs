@@ -1,6 +1,8 @@
 //! Whole steps of free fall with one particle, one particle per cell, nodes of mass 1e-300, and a singular consistent mass.
 
-use super::bodies::{self, PLAIN, body, fill, gravity, left_by_newton, normal, settings, simulation, stir, sum_of_momenta};
+use super::bodies::{
+    self, PLAIN, body, fill, gravity, left_by_newton, normal, settings, simulation, stir, sum_of_momenta,
+};
 use super::{Outcome, Report, at_most, refused, rows, steps, worse};
 use bfree::approximation::{Approximation, Bspline, Gimp, Linear, Lme};
 use bfree::grid::Grid;
@@ -50,8 +52,10 @@ const PLACES: [Place; 7] = [
 ];
 
 pub(super) fn run(outcome: &mut Outcome) {
-    let mut alone = rows("a lone particle in free fall: errors of velocity and place over its speed, and what it is strained");
-    let mut blocks = rows("one particle a cell: change of the linear momentum over sum m |v|, and way over what energy allows");
+    let mut alone =
+        rows("a lone particle in free fall: errors of velocity and place over its speed, and what it is strained");
+    let mut blocks =
+        rows("one particle a cell: change of the linear momentum over sum m |v|, and way over what energy allows");
     for (name, shape) in &families() {
         for lumping in [1.0, 0.5] {
             lonely::<1>(name, shape, lumping, &mut alone);

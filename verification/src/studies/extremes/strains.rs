@@ -66,9 +66,11 @@ pub(super) fn run(effort: &Effort, outcome: &mut Outcome) {
         Effort::Full => (-30..=2).map(|k| 10.0_f64.powf(0.5 * f64::from(k))).collect(),
     };
     let columns = ["quantity", "beforehand", "law", "D", "strain", "kind"];
-    let mut report = Report::new("strains 1e-15 to 10: roundings, in eps, that the errors of W and S amount to", &columns)
-        .as_matrix(&[0, 1], 4, 5);
-    let mut judge_of_judge = super::rows("the reference against textbook formulas in double-double, strains 1e-3 to 10");
+    let mut report =
+        Report::new("strains 1e-15 to 10: roundings, in eps, that the errors of W and S amount to", &columns)
+            .as_matrix(&[0, 1], 4, 5);
+    let mut judge_of_judge =
+        super::rows("the reference against textbook formulas in double-double, strains 1e-3 to 10");
     let mut worst_reference: f64 = 0.0;
     for &size in &sizes {
         for (name, law) in &laws() {
@@ -81,9 +83,16 @@ pub(super) fn run(effort: &Effort, outcome: &mut Outcome) {
             }
         }
     }
-    report.note("An error is judged by what rounding H changes, eps |H| |dS/dH|, beside eps |S|: a strain of 1e-15 in a");
+    report
+        .note("An error is judged by what rounding H changes, eps |H| |dS/dH|, beside eps |S|: a strain of 1e-15 in a");
     report.note("body turned by 2 rad is below the last digit of H itself, and no formula can know it.");
-    super::solvable(&mut judge_of_judge, "W and S", "random", Ok::<_, std::convert::Infallible>(worst_reference), REFERENCE);
+    super::solvable(
+        &mut judge_of_judge,
+        "W and S",
+        "random",
+        Ok::<_, std::convert::Infallible>(worst_reference),
+        REFERENCE,
+    );
     outcome.reports.extend([judge_of_judge, report]);
 }
 

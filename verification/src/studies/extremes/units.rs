@@ -34,7 +34,8 @@ struct Scaling {
 }
 
 pub(super) fn run() -> Result<Report, StudyError> {
-    let mut report = rows("units of length, mass and time: numbers that have other bits, or the largest dimensionless difference");
+    let mut report =
+        rows("units of length, mass and time: numbers that have other bits, or the largest dimensionless difference");
     let two = Scaling { name: "2^30", large: 2.0_f64.powi(30) };
     let ten = Scaling { name: "1e9", large: 1e9 };
     dimension::<1>([two, ten], &mut report)?;
@@ -55,9 +56,8 @@ fn dimension<const D: usize>([two, ten]: [Scaling; 2], report: &mut Report) -> R
             let sign = |bit: u32| if signs >> bit & 1 == 1 { "/" } else { "*" };
             format!("length {}, mass {}, time {} {}", sign(0), sign(1), sign(2), scaling.name)
         };
-        let bits = answer::<D>(units(two)).map(|other| {
-            plain.iter().zip(&other).filter(|(a, b)| a.0.to_bits() != b.0.to_bits()).count() as f64
-        });
+        let bits = answer::<D>(units(two))
+            .map(|other| plain.iter().zip(&other).filter(|(a, b)| a.0.to_bits() != b.0.to_bits()).count() as f64);
         solvable(report, &what, &case(two), bits, 0.0);
         let difference = answer::<D>(units(ten))
             .map(|other| plain.iter().zip(&other).fold(0.0, |worst, (a, b)| worse(worst, (a.0 - b.0).abs() / a.1)));
@@ -81,7 +81,12 @@ fn answer<const D: usize>(units: Units) -> Result<Vec<(f64, f64)>, StudyError> {
     let mut numbers = vectors(&particles.position, length, 1.0);
     numbers.extend(vectors(&particles.velocity, length / time, 1.0));
     numbers.extend(vectors(&particles.acceleration, length / (time * time), 10.0));
-    numbers.extend(particles.displacement_gradient.iter().flat_map(|h: &Tensor<f64, D>| h.iter().map(|x| (*x, 1.0)).collect::<Vec<_>>()));
+    numbers.extend(
+        particles
+            .displacement_gradient
+            .iter()
+            .flat_map(|h: &Tensor<f64, D>| h.iter().map(|x| (*x, 1.0)).collect::<Vec<_>>()),
+    );
     Ok(numbers)
 }
 

@@ -8,7 +8,7 @@ use crate::studies::StudyError;
 use crate::studies::tangent::cloud;
 use crate::{check_material, check_tangent};
 use bfree::approximation::Bspline;
-use bfree::material::{ClosedTangent, Law, Lame, Material, NeoHookean, StVenantKirchhoff, MaterialState};
+use bfree::material::{ClosedTangent, Lame, Law, Material, MaterialState, NeoHookean, StVenantKirchhoff};
 use bfree::scalar::Real;
 use bfree::tensor::{Tensor, Vector, contract, identity, outer, scaled, symmetric, trace};
 
@@ -118,7 +118,12 @@ impl Law for Wrong {
         }
     }
 
-    fn tangent_density<const D: usize>(&self, at: &MaterialState<f64, D>, v: &Vector<f64, D>, b: &Vector<f64, D>) -> Tensor<f64, D> {
+    fn tangent_density<const D: usize>(
+        &self,
+        at: &MaterialState<f64, D>,
+        v: &Vector<f64, D>,
+        b: &Vector<f64, D>,
+    ) -> Tensor<f64, D> {
         let right = |v, b| self.law::<D>().tangent_density(at, v, b);
         match self.fault {
             Fault::DensitySwapped => right(b, v),
@@ -138,7 +143,10 @@ impl Law for Wrong {
         }
     }
 
-    fn closed<const D: usize>(&self, f_n: &Tensor<f64, D>, at: &MaterialState<f64, D>,
+    fn closed<const D: usize>(
+        &self,
+        f_n: &Tensor<f64, D>,
+        at: &MaterialState<f64, D>,
         volume: f64,
     ) -> Option<ClosedTangent<f64, D>> {
         if self.general {
@@ -190,7 +198,12 @@ fn kirchhoff(lame: Lame) -> Material {
 
 const MUTANTS: &[Mutant] = &[
     ("W 1% too large", ciarlet, Fault::EnergyFactor, &[red(S, ALL)]),
-    ("S scaled by 1 + 1e-6", ciarlet, Fault::StressScaled, &[red(S, ALL).except(TINY_WORK), red(C, ALL), red(FROZEN, ALL)]),
+    (
+        "S scaled by 1 + 1e-6",
+        ciarlet,
+        Fault::StressScaled,
+        &[red(S, ALL).except(TINY_WORK), red(C, ALL), red(FROZEN, ALL)],
+    ),
     (
         "S not symmetric",
         ciarlet,
@@ -238,10 +251,7 @@ const BY_DENSITY: &[Mutant] = &[(
     "no potential, and not symmetric (but in 1D)",
     ciarlet,
     Fault::NoPotential,
-    &[
-        red(S, ALL),
-        red("tangent symmetric", PLANE_AND_SPACE),
-    ],
+    &[red(S, ALL), red("tangent symmetric", PLANE_AND_SPACE)],
 )];
 
 /// Every increment of [`check_tangent`].
@@ -262,12 +272,7 @@ macro_rules! material {
 /// Some of the faults in a whole step, with the cells of [`check_tangent`] that must turn red. A law with a closed form acts through it.
 const IN_A_STEP: &[Mutant] = &[
     ("W 1% too large, in a step", ciarlet, Fault::EnergyFactor, &[red("dual(Pi) - R.u", INCREMENTS)]),
-    (
-        "S scaled by 1 + 1e-6, in a step",
-        ciarlet,
-        Fault::StressScaled,
-        material![red("dual(Pi) - R.u", INCREMENTS)],
-    ),
+    ("S scaled by 1 + 1e-6, in a step", ciarlet, Fault::StressScaled, material![red("dual(Pi) - R.u", INCREMENTS)]),
     ("closed form not pulled back, in a step", ciarlet, Fault::ClosedOfIdentity, material![]),
     ("v and b swapped in Cmat, beside a closed form: not called", kirchhoff, Fault::DensitySwapped, &[]),
 ];

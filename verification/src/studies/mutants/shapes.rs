@@ -98,9 +98,25 @@ const OFF_NODES: &[&str] = &["inside a cell", "near a wall"];
 const OFF_WALLS: &[&str] = OFF_NODES;
 
 const MUTANTS: &[(&str, Fault, &[Red])] = &[
-    ("gradients with the other sign", Fault::GradientSign, &[red(FIRST_GRADIENT, ALL), red(DIFFERENCES, PLANE_AND_SPACE).except(ON_NODES), red(DIFFERENCES, LINE).except(ON_NODES_OF_A_LINE)]),
+    (
+        "gradients with the other sign",
+        Fault::GradientSign,
+        &[
+            red(FIRST_GRADIENT, ALL),
+            red(DIFFERENCES, PLANE_AND_SPACE).except(ON_NODES),
+            red(DIFFERENCES, LINE).except(ON_NODES_OF_A_LINE),
+        ],
+    ),
     ("no partition of unity, by 1e-6", Fault::Unity, &[red(UNITY, ALL), red(FIRST_GRADIENT, ALL)]),
-    ("no first-order consistency", Fault::Consistency, &[red(FIRST, PLANE_AND_SPACE).except(ON_NODES), red(FIRST, LINE).except(ON_NODES_OF_A_LINE), red(FIRST_GRADIENT, ALL)]),
+    (
+        "no first-order consistency",
+        Fault::Consistency,
+        &[
+            red(FIRST, PLANE_AND_SPACE).except(ON_NODES),
+            red(FIRST, LINE).except(ON_NODES_OF_A_LINE),
+            red(FIRST_GRADIENT, ALL),
+        ],
+    ),
     (
         "nodes with N = 0 left out",
         Fault::FarNodeDropped,

@@ -102,7 +102,8 @@ const UNITS: &str = "bfree";
 
 /// Builds the programs in a folder of their own, so that the normal build stays as it is.
 fn build() -> Result<Programs, ShippedFaultError> {
-    let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), PathBuf::from).join("mutants");
+    let target =
+        std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), PathBuf::from).join("mutants");
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let built = |what: &[&str]| {
         let mut command = Command::new(&cargo);

@@ -1,9 +1,9 @@
 //! The fast and the plain transfer must agree, for every law, shape function and D.
 
 use super::general::General;
-use crate::settling::{block, lame};
 use crate::random::Random;
 use crate::report::{Bound, Report};
+use crate::settling::{block, lame};
 use crate::studies::StudyError;
 use bfree::approximation::{Approximation, ShapeFunction};
 use bfree::material::{Law, Material};
@@ -33,7 +33,8 @@ pub(super) fn judge<const D: usize>(report: &mut Report, cells: u32) -> Result<(
             simulation.grid.spacing *= SPACING;
             simulation.particles.position.iter_mut().for_each(|x| *x *= SPACING);
             let mut random = Random::new(7);
-            for (h, v) in simulation.particles.displacement_gradient.iter_mut().zip(&mut simulation.particles.velocity) {
+            for (h, v) in simulation.particles.displacement_gradient.iter_mut().zip(&mut simulation.particles.velocity)
+            {
                 *h = Tensor::from_fn(|_, _| 0.15 * random.signed());
                 *v = random.vector();
             }

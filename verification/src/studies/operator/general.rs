@@ -21,7 +21,12 @@ impl Law for General {
         self.0.elasticity(at, x)
     }
 
-    fn tangent_density<const D: usize>(&self, at: &MaterialState<f64, D>, v: &Vector<f64, D>, b: &Vector<f64, D>) -> Tensor<f64, D> {
+    fn tangent_density<const D: usize>(
+        &self,
+        at: &MaterialState<f64, D>,
+        v: &Vector<f64, D>,
+        b: &Vector<f64, D>,
+    ) -> Tensor<f64, D> {
         self.0.tangent_density(at, v, b)
     }
 }

@@ -122,8 +122,18 @@ fn kept(effort: Effort, outcome: &mut Outcome) {
     let in_space = |case: &Case| effort == Effort::Full || case.name == "linear";
     let title = "a block between walls, J from 0.3 to 1.7, no inertia, the grid kept";
     let mut report = Report::new(format!("{title}: order in h"), &["of", "shape", "layout", "u at walls", "D"]);
-    let header =
-        ["shape", "layout", "u at walls", "D", "cells", "displacement", "order", "stress", "order", "products x particles"];
+    let header = [
+        "shape",
+        "layout",
+        "u at walls",
+        "D",
+        "cells",
+        "displacement",
+        "order",
+        "stress",
+        "order",
+        "products x particles",
+    ];
     let mut table = Table::new(format!("{title}: errors, relative, in the mean square"), header);
     for case in curved() {
         let mut refining = Refining { case: &case, walls: "curved", report: &mut report, table: &mut table };
@@ -147,7 +157,18 @@ fn kept(effort: Effort, outcome: &mut Outcome) {
 fn with_inertia(outcome: &mut Outcome) {
     let title = "that block in 2D with inertia, eps = 0, the grid kept, dt = h / 2";
     let mut report = Report::new(format!("{title}: order in h"), &["of", "shape", "layout"]);
-    let header = ["shape", "layout", "cells", "displacement", "order", "velocity", "order", "stress", "order", "products x particles"];
+    let header = [
+        "shape",
+        "layout",
+        "cells",
+        "displacement",
+        "order",
+        "velocity",
+        "order",
+        "stress",
+        "order",
+        "products x particles",
+    ];
     let mut table = Table::new(format!("{title}: errors, relative, in the mean square"), header);
     let (quadratic, cubic) = (Bspline::Quadratic, Bspline::Cubic);
     let cases: [(_, Approximation, _, _); 4] = [
@@ -164,7 +185,8 @@ fn with_inertia(outcome: &mut Outcome) {
             let grid = Grid { origin: Vector::zeros(), spacing: f64::from(cells).recip(), cells: [cells; 2] };
             let settings = Settings { lumping: 0.0, grid_reset: GridReset::Never, ..Settings::default() };
             let block = Block::curved_at_walls::<2>(CHANGE);
-            let held = Held::new(block, grid, (&shape, layout), None, 0.5 / f64::from(cells), settings)?.after(2 * cells)?;
+            let held =
+                Held::new(block, grid, (&shape, layout), None, 0.5 / f64::from(cells), settings)?.after(2 * cells)?;
             Ok(([held.displacement(), held.velocity(), held.stress()], held.work))
         });
     }
@@ -184,9 +206,11 @@ fn renewed(outcome: &mut Outcome) {
         let Some(bound) = case.floor else { continue };
         for cells in [16, 32] {
             let mut row = [case.name, case.layout.name, &cells.to_string()].map(String::from).to_vec();
-            for (steps, grid_reset, name) in
-                [(2, GridReset::Never, "kept"), (2, GridReset::EveryStep, "once"), (8, GridReset::EveryStep, "in every step of 8")]
-            {
+            for (steps, grid_reset, name) in [
+                (2, GridReset::Never, "kept"),
+                (2, GridReset::EveryStep, "once"),
+                (8, GridReset::EveryStep, "in every step of 8"),
+            ] {
                 let labels = [name, case.name, case.layout.name];
                 let found = loaded::<2>(Block::curved_at_walls::<2>(CHANGE), &case, cells, steps, grid_reset);
                 match found.map(|held| held.stress()) {

@@ -17,7 +17,7 @@ use crate::table::Table;
 use bfree::approximation::Approximation;
 use bfree::clock::Clock;
 use bfree::grid::Grid;
-use bfree::material::{Lame, Law, Material, NeoHookean, MaterialState};
+use bfree::material::{Lame, Law, Material, MaterialState, NeoHookean};
 use bfree::mechanics::loads::{self, Curve, Loads, Prescribed, Pressing, Selection, SurfaceLoad, SurfacePoint};
 use bfree::particles::{Body, Particles};
 use bfree::shape::{self, Ball, Block, Difference, Fill, Filling, GridBox, Seed, Shape, fill};
@@ -25,8 +25,7 @@ use bfree::simulation::{InitialGuess, Settings, Simulation};
 use bfree::tensor::{Tensor, Vector};
 
 /// The summary in the list of studies.
-pub(super) const ABOUT: &str =
-    "orders in h and dt at large deformation on a grid that is kept; what its grid_reset costs; the energy that the rebound loses";
+pub(super) const ABOUT: &str = "orders in h and dt at large deformation on a grid that is kept; what its grid_reset costs; the energy that the rebound loses";
 
 /// The allowed shortfall of an observed order. An error C hᵖ (1 + c h) of a body with c = 2, from 16 to 32 cells across, shows the order p
 /// + 2 (1/16 − 1/32)/ln 2.
@@ -89,10 +88,12 @@ impl<M: Motion<D> + Copy + Send + 'static, const D: usize> Held<M, D> {
                 particles.push_without_inertia(x, volume, volume, 0);
             }
         }
-        let surface = hole.map_or(Ok(Vec::new()), |hole| tractions((&motion, &law), &grid, (&body, hole), &mut particles))?;
+        let surface =
+            hole.map_or(Ok(Vec::new()), |hole| tractions((&motion, &law), &grid, (&body, hole), &mut particles))?;
         let reference = particles.position.clone();
         let faces = (0..D).flat_map(|axis| [false, true].map(|upper| Selection::Face { axis, upper }));
-        let wall = |on| Prescribed { name: "wall".into(), on, motion: std::array::from_fn(|_| Some(loads::Motion::Rest)) };
+        let wall =
+            |on| Prescribed { name: "wall".into(), on, motion: std::array::from_fn(|_| Some(loads::Motion::Rest)) };
         let loads = Loads {
             prescribed: faces.map(wall).collect(),
             field: Some(force_field(motion, law.clone(), 1.0, reference.clone())),

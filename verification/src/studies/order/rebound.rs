@@ -25,12 +25,7 @@ struct Case {
     reference: Option<f64>,
 }
 
-const fn case(
-    effort: Effort,
-    name: &'static str,
-    overrides: &'static [&'static str],
-    reference: Option<f64>,
-) -> Case {
+const fn case(effort: Effort, name: &'static str, overrides: &'static [&'static str], reference: Option<f64>) -> Case {
     Case { name, overrides, effort, reference }
 }
 
@@ -70,7 +65,8 @@ fn rebound(overrides: &[&str], walls: WallUpdate) -> Result<(f64, usize), StudyE
 pub(super) fn run(effort: Effort, outcome: &mut Outcome) -> Result<(), StudyError> {
     let mut report = Report::new("the rebound after its first impact, t = 30", &["quantity", "against", "walls"]);
     let header = ["changed", "walls", "energy", "lost", "Newton"];
-    let mut table = Table::new("the rebound: energy lost of 3.5, with dt = 0.05, eps = 1, h = 0.5 where not changed", header);
+    let mut table =
+        Table::new("the rebound: energy lost of 3.5, with dt = 0.05, eps = 1, h = 0.5 where not changed", header);
     for case in CASES.iter().filter(|case| case.effort <= effort) {
         for (walls, name) in WALLS {
             let (energy, iterations) = rebound(case.overrides, walls)?;

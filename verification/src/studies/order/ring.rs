@@ -7,7 +7,7 @@ use crate::studies::{Effort, Outcome, StudyError};
 use crate::table::Table;
 use bfree::material::{Law, MaterialState};
 use bfree::simulation::Simulation;
-use bfree::tensor::{Tensor};
+use bfree::tensor::Tensor;
 
 /// Inner and outer radius, Λ and G of the scene; the pressure.
 const RADII: [f64; 2] = [1.0, 1.5];
@@ -123,7 +123,8 @@ const CIRCLE: f64 = 1e-5;
 pub(super) fn run(effort: Effort, outcome: &mut Outcome) {
     let title = "a thick ring under inner pressure, its hole a third wider";
     let mut report = Report::new(format!("{title}: order in h"), &["of", "shape"]);
-    let header = ["shape", "cells in 1", "hole", "order", "displacement", "order", "stress", "order", "products x particles"];
+    let header =
+        ["shape", "cells in 1", "hole", "order", "displacement", "order", "stress", "order", "products x particles"];
     let mut table = Table::new(format!("{title}: errors, relative to the solution at finite strain"), header);
     let hole = at_hole(shot(PRESSURE), PRESSURE);
     let mut of_circle = 0.0;
@@ -162,6 +163,11 @@ mod tests {
         let [a, b] = RADII;
         let lame = |p: f64| p * a * a / (2.0 * SHEAR * (b * b - a * a)) * (0.5 * a + b * b / a);
         let apart = |p: f64| (at_hole(shot(p), p)[0] - a) / lame(p) - 1.0;
-        assert!(apart(1e-3).abs() < 1e-5 && (apart(1e-1) / apart(1e-2) - 10.0).abs() < 0.1, "{} {}", apart(1e-3), apart(1e-1));
+        assert!(
+            apart(1e-3).abs() < 1e-5 && (apart(1e-1) / apart(1e-2) - 10.0).abs() < 0.1,
+            "{} {}",
+            apart(1e-3),
+            apart(1e-1)
+        );
     }
 }

@@ -7,7 +7,7 @@ use crate::table::Table;
 use bfree::material::{Law, MaterialState};
 use bfree::scene;
 use bfree::simulation::Simulation;
-use bfree::tensor::{Tensor};
+use bfree::tensor::Tensor;
 
 /// Inner and outer radius; Λ = G of the scene's E = 2500, ν = ¼. Squares of strains, 1e-6, are below all errors.
 const RADII: [f64; 2] = [1.0, 2.0];

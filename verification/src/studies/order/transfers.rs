@@ -51,7 +51,11 @@ const STEPS: u32 = 40;
 
 /// The changes over one radian of rotation: of the linear momentum over Σ m |v|, and of angular momentum and energy over their initial
 /// values. The grid is reset after the steps that `renewed_after` selects.
-fn lost(shape: &Approximation, transfer: &Transfer, renewed_after: impl Fn(u32) -> bool) -> Result<[f64; 3], StudyError> {
+fn lost(
+    shape: &Approximation,
+    transfer: &Transfer,
+    renewed_after: impl Fn(u32) -> bool,
+) -> Result<[f64; 3], StudyError> {
     let mut simulation = spinning(shape, transfer.lumping, 2.0 / f64::from(STEPS))?;
     simulation.settings = transfer.settings(simulation.settings);
     simulation.settings.scheme = Arc::new(GeneralizedAlpha { spectral_radius: 1.0 });
@@ -76,7 +80,16 @@ fn losses(outcome: &mut Outcome) {
     let mut report = Report::new(format!("{title}: what transfers take"), &["of", "grid", "shape", "transfer"]);
     let mut table = Table::new(
         format!("{title}: change of angular momentum and energy, over the start"),
-        ["shape", "transfer", "L, kept", "one grid_reset", "new in every step", "E, kept", "one grid_reset", "new in every step"],
+        [
+            "shape",
+            "transfer",
+            "L, kept",
+            "one grid_reset",
+            "new in every step",
+            "E, kept",
+            "one grid_reset",
+            "new in every step",
+        ],
     );
     for (name, shape) in families() {
         for transfer in &TRANSFERS {
@@ -105,7 +118,11 @@ fn losses(outcome: &mut Outcome) {
             }
             let mut row = vec![name.to_string(), transfer.name.into()];
             for k in 0..2 {
-                row.extend([format!("{:.2e}", found[0][k]), format!("{:+.2e}", found[1][k] - found[0][k]), format!("{:.2e}", found[2][k])]);
+                row.extend([
+                    format!("{:.2e}", found[0][k]),
+                    format!("{:+.2e}", found[1][k] - found[0][k]),
+                    format!("{:.2e}", found[2][k]),
+                ]);
             }
             table.push(row);
         }

@@ -38,14 +38,34 @@ fn in_space(effort: Effort, outcome: &mut Outcome) {
     use Effort::{Full, Short};
     let title = "a vortex, the grid kept, dt = 2.56 h^2";
     let mut report = Report::new(format!("{title}: order in h"), &["of", "shape", "layout", "eps"]);
-    let header = ["shape", "layout", "eps", "cells", "displacement", "order", "velocity", "order", "stress", "order", "products x particles"];
+    let header = [
+        "shape",
+        "layout",
+        "eps",
+        "cells",
+        "displacement",
+        "order",
+        "velocity",
+        "order",
+        "stress",
+        "order",
+        "products x particles",
+    ];
     let mut table = Table::new(format!("{title}: errors, relative, in the mean square"), header);
     // A lumped mass, and a consistent one with linear functions, show their orders on finer grids only.
     let cases = [
         (Short, "linear", Approximation::from(Linear), &REGULAR, 1.0, [20, 35], [Some(2.0), Some(2.0), Some(1.0)]),
         (Full, "cubic", Bspline::Cubic.into(), &GAUSS, 1.0, [35, 50], [Some(2.0), Some(2.0), None]),
         (Full, "linear", Linear.into(), &REGULAR, 0.0, [35, 50], [Some(2.0), Some(2.0), Some(1.0)]),
-        (Full, "quadratic", Bspline::Quadratic.into(), &GAUSS_OF_MIDDLES, 0.0, [20, 35], [Some(3.0), Some(3.0), Some(2.0)]),
+        (
+            Full,
+            "quadratic",
+            Bspline::Quadratic.into(),
+            &GAUSS_OF_MIDDLES,
+            0.0,
+            [20, 35],
+            [Some(3.0), Some(3.0), Some(2.0)],
+        ),
         (Short, "cubic", Bspline::Cubic.into(), &GAUSS, 0.0, [20, 35], [Some(4.0), Some(4.0), Some(3.0)]),
     ];
     for (_, name, shape, layout, lumping, sizes, orders) in cases.into_iter().filter(|case| case.0 <= effort) {

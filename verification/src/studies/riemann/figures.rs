@@ -132,7 +132,8 @@ fn convergence(runs: &Runs) -> Result<Sheet, StudyError> {
     });
     Ok(Sheet {
         name: "riemann_convergence",
-        caption: "Fig. 6: errors against the spacing at fixed Courant number, and profiles at the smallest spacing.".into(),
+        caption: "Fig. 6: errors against the spacing at fixed Courant number, and profiles at the smallest spacing."
+            .into(),
         columns: 3,
         size: (430, 360),
         panels,
@@ -169,7 +170,9 @@ fn strong(runs: &Runs) -> Result<Sheet, StudyError> {
     for (k, size) in [100.0, 1000.0, -1000.0].into_iter().enumerate() {
         let jump = Jump::of(size);
         let mut curves = vec![exact(jump, 32.0, 68.0)?];
-        for (method, courant, color) in [(LME, 1.0, 1), (Method::UNDISSIPATED, COURANT, 5), (Method::RECOMMENDED, COURANT, 4)] {
+        for (method, courant, color) in
+            [(LME, 1.0, 1), (Method::UNDISSIPATED, COURANT, 5), (Method::RECOMMENDED, COURANT, 4)]
+        {
             if let Ok(found) = runs.of(method, jump, STRONG_SPACING, courant) {
                 curves.push(Curve::new(method.name, color, Mark::Line, found.profile.clone()));
             }

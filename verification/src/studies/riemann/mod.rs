@@ -90,12 +90,11 @@ impl Runs {
             }
         }
         // Long runs start first, so that no core idles at the end.
-        let least_work = |case: &Case| {
-            case.mesh.h * case.mesh.h * case.mesh.courant / case.jump.young
-        };
+        let least_work = |case: &Case| case.mesh.h * case.mesh.h * case.mesh.courant / case.jump.young;
         once.sort_by(|a, b| least_work(a).total_cmp(&least_work(b)));
         let runs = once.into_par_iter().with_max_len(1).map(|case| {
-            let measured = bar::run(&case.method, &case.jump, &case.mesh).map_err(|error| crate::report::chain(&*error));
+            let measured =
+                bar::run(&case.method, &case.jump, &case.mesh).map_err(|error| crate::report::chain(&*error));
             (case, measured)
         });
         Self(runs.collect())
@@ -179,7 +178,8 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
         cases.extend(figures::cases());
     }
     let runs = Runs::new(cases);
-    let mut outcome = Outcome { reports: vec![reference(&runs, &plan)?, recommended(&runs, &plan)?], ..Outcome::default() };
+    let mut outcome =
+        Outcome { reports: vec![reference(&runs, &plan)?, recommended(&runs, &plan)?], ..Outcome::default() };
     if *effort == Effort::Full {
         outcome.tables = tables::all(&runs);
         outcome.sheets = figures::all(&runs)?;

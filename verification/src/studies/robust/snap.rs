@@ -61,7 +61,8 @@ fn williams(displacement: f64) -> f64 {
 
 /// The path by arc length, from the start over both turning points until the bars are under tension.
 pub(super) fn snap_through(effort: Effort) -> Result<Report, StudyError> {
-    let mut report = Report::new("snap-through of a toggle frame, by the length of its path", &["quantity", "cells in the depth"]);
+    let mut report =
+        Report::new("snap-through of a toggle frame, by the length of its path", &["quantity", "cells in the depth"]);
     let depths: &[u32] = match effort {
         Effort::Short => &[4],
         Effort::Full => &[4, 8],
@@ -90,6 +91,7 @@ pub(super) fn snap_through(effort: Effort) -> Result<Report, StudyError> {
         report.push(&["load steps", &labels], loads.len() as f64, Bound::Reported);
         report.push(&["most Newton iterations of a step", &labels], iterations as f64, Bound::Reported);
     }
-    report.note("Two shallow bars, rise over length 0.05, rise over depth 2: closed form, with bending and shortening.");
+    report
+        .note("Two shallow bars, rise over length 0.05, rise over depth 2: closed form, with bending and shortening.");
     Ok(report)
 }

@@ -41,7 +41,10 @@ fn asked(effort: Effort) -> Vec<Accuracy> {
     match effort {
         Effort::Short => rows.iter().filter(|level| level.name.is_some()).map(named).collect(),
         Effort::Full => {
-            let between = rows.windows(2).filter(|pair| pair[0].error.is_finite()).map(|pair| Accuracy::Error((pair[0].error * pair[1].error).sqrt()));
+            let between = rows
+                .windows(2)
+                .filter(|pair| pair[0].error.is_finite())
+                .map(|pair| Accuracy::Error((pair[0].error * pair[1].error).sqrt()));
             let mut all: Vec<_> = rows.iter().map(named).chain(between).collect();
             let error = |one: &Accuracy| one.level().map_or(0.0, |level| level.error);
             all.sort_by(|a, b| error(b).total_cmp(&error(a)));
@@ -63,16 +66,29 @@ pub(super) fn report(all: &[Measured], effort: Effort) -> Report {
             let Some(point) = of(accuracy) else { continue };
             let name = accuracy.to_string();
             if let Some(before) = before {
-                report.push(&["error over that of the word before", &name, measured.problem], point.error / before.error, Bound::AtMost(1.0));
-                report.push(&["work over that of the word before", &name, measured.problem], point.cost.work / before.cost.work, Bound::AtLeast(1.0));
+                report.push(
+                    &["error over that of the word before", &name, measured.problem],
+                    point.error / before.error,
+                    Bound::AtMost(1.0),
+                );
+                report.push(
+                    &["work over that of the word before", &name, measured.problem],
+                    point.cost.work / before.cost.work,
+                    Bound::AtLeast(1.0),
+                );
             }
             before = Some(point);
         }
         if effort == Effort::Full {
             for accuracy in asked(effort) {
                 let (Some(point), Some(level)) = (of(accuracy), accuracy.level()) else { continue };
-                let bound = if measured.smooth && level.error.is_finite() { Bound::AtMost(MET) } else { Bound::Reported };
-                report.push(&["error over the one aimed for", &accuracy.to_string(), measured.problem], point.error / level.error, bound);
+                let bound =
+                    if measured.smooth && level.error.is_finite() { Bound::AtMost(MET) } else { Bound::Reported };
+                report.push(
+                    &["error over the one aimed for", &accuracy.to_string(), measured.problem],
+                    point.error / level.error,
+                    bound,
+                );
             }
         }
     }

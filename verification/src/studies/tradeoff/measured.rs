@@ -93,7 +93,8 @@ mod tests {
             let cost = Cost { tally: Tally::default(), work, seconds: work, bytes: 0 };
             Point { setting: Setting::base(), error, cost }
         };
-        let points = [point(3.0, 0.1), point(1.0, 0.5), point(2.0, 0.5), point(2.0, 0.2), point(4.0, 0.1), point(5.0, 0.3)];
+        let points =
+            [point(3.0, 0.1), point(1.0, 0.5), point(2.0, 0.5), point(2.0, 0.2), point(4.0, 0.1), point(5.0, 0.3)];
         let found: Vec<_> = front(points.iter().collect()).iter().map(|p| (p.cost.work, p.error)).collect();
         assert_eq!(found, [(1.0, 0.5), (2.0, 0.2), (3.0, 0.1)]);
         assert!(points[5].dominated(&points[0]) < 1.0 && points[1].dominated(&points[0]) > 1.0);

@@ -45,7 +45,8 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
         threads.into_iter().map(|thread| thread.join().unwrap_or_else(lost)).collect()
     });
     let all = all.into_iter().collect::<Result<Vec<_>, _>>()?;
-    let mut outcome = Outcome { reports: vec![defaults(&all, effort), levels::report(&all, effort)], ..Outcome::default() };
+    let mut outcome =
+        Outcome { reports: vec![defaults(&all, effort), levels::report(&all, effort)], ..Outcome::default() };
     let defaults = problems.first().map(|problem| knobs(&**problem)).unwrap_or_default();
     outcome.remarks.push(base(&problems));
     outcome.tables.extend(all.iter().map(front));
@@ -64,7 +65,8 @@ fn measure(problem: &dyn Problem, effort: Effort) -> Result<Measured, String> {
 
 /// The base in words.
 fn base(problems: &[Box<dyn Problem>]) -> String {
-    let sizes: Vec<_> = problems.iter().map(|one| format!("h = 1/{:.4} ({})", one.cells()[BASE_LEVEL], one.name())).collect();
+    let sizes: Vec<_> =
+        problems.iter().map(|one| format!("h = 1/{:.4} ({})", one.cells()[BASE_LEVEL], one.name())).collect();
     format!(
         "The base: what a scene has that gives no knob, at cΔt/h = {COURANT} and {}. Errors are relative to the size of the answer. Work is \
          counted: shape functions, residuals, linearisations, products with the tangent and iterations of the projection, each times its usual \

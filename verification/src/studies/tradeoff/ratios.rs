@@ -27,7 +27,11 @@ impl Ratio {
         if mean.is_nan() {
             return "-".into();
         }
-        if greatest / least < 1.02 { format!("×{mean:.2}") } else { format!("×{mean:.2} ({least:.2} to {greatest:.2})") }
+        if greatest / least < 1.02 {
+            format!("×{mean:.2}")
+        } else {
+            format!("×{mean:.2} ({least:.2} to {greatest:.2})")
+        }
     }
 }
 
@@ -50,7 +54,8 @@ struct Value {
 fn values(all: &[Measured], knob: &str, default: &str) -> Vec<Value> {
     let mut names = vec![default];
     for measured in all {
-        let turned = measured.points.iter().map(|point| &point.setting).chain(measured.failures.iter().map(|one| &one.0));
+        let turned =
+            measured.points.iter().map(|point| &point.setting).chain(measured.failures.iter().map(|one| &one.0));
         for name in turned.filter_map(|setting| setting.of_knob(knob)) {
             if !names.contains(&name) {
                 names.push(name);
@@ -62,7 +67,8 @@ fn values(all: &[Measured], knob: &str, default: &str) -> Vec<Value> {
         for measured in all {
             let matches = |setting: &Setting| setting.of_knob(knob) == Some(name);
             let base = measured.base_of(knob);
-            let found = if name == default { base } else { measured.points.iter().find(|point| matches(&point.setting)) };
+            let found =
+                if name == default { base } else { measured.points.iter().find(|point| matches(&point.setting)) };
             if let (Some(Point { error, cost, .. }), Some(base)) = (found, base) {
                 let pairs = [
                     (*error, base.error),
@@ -92,7 +98,8 @@ fn values(all: &[Measured], knob: &str, default: &str) -> Vec<Value> {
 /// The table of a knob.
 pub(super) fn table(all: &[Measured], knob: &'static str, default: &str) -> Table {
     let header = ["value", "error", "work", "CPU s", "bytes", "Newton", "problems", "fails on"];
-    let mut table = Table::new(format!("{knob}: ratios to the default, the geometric mean (least to greatest)"), header);
+    let mut table =
+        Table::new(format!("{knob}: ratios to the default, the geometric mean (least to greatest)"), header);
     for value in values(all, knob, default) {
         let ratio = |ratio: Ratio| if value.problems > 0 { ratio.text() } else { "-".into() };
         table.push([
@@ -101,7 +108,14 @@ pub(super) fn table(all: &[Measured], knob: &'static str, default: &str) -> Tabl
             ratio(value.work),
             ratio(value.seconds),
             ratio(value.bytes),
-            if value.problems == 0 { "-" } else if value.quadratic { "quadratic" } else { "linear" }.to_owned(),
+            if value.problems == 0 {
+                "-"
+            } else if value.quadratic {
+                "quadratic"
+            } else {
+                "linear"
+            }
+            .to_owned(),
             value.problems.to_string(),
             value.failed.join(", "),
         ]);

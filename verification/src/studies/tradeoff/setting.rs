@@ -90,7 +90,12 @@ pub(super) const KNOBS: &[Knob] = &[
         dimensions: 1..=3,
     },
     Knob { key: "approximation.lme.gamma", values: &["1.4", "0.8", "2", "3", "4", "6"], short: 1, dimensions: 1..=3 },
-    Knob { key: "approximation.lme.tolerance", values: &["1e-3", "1e-6", "1e-9", "1e-12"], short: 0, dimensions: 1..=3 },
+    Knob {
+        key: "approximation.lme.tolerance",
+        values: &["1e-3", "1e-6", "1e-9", "1e-12"],
+        short: 0,
+        dimensions: 1..=3,
+    },
     Knob { key: "approximation.lme.support", values: &[r#""separable""#, r#""circle""#], short: 0, dimensions: 2..=2 },
     Knob { key: "bodies.0.particles_per_cell", values: &["3", "1", "2"], short: 1, dimensions: 1..=3 },
     Knob { key: "time.lumping", values: &["0.1", "0", "0.02", "0.5", "1"], short: 1, dimensions: 1..=3 },
@@ -130,12 +135,7 @@ pub(super) const KNOBS: &[Knob] = &[
         short: 1,
         dimensions: 1..=3,
     },
-    Knob {
-        key: "solver.krylov.method",
-        values: &[r#"{"gmres":{"restart":30}}"#],
-        short: 1,
-        dimensions: 1..=3,
-    },
+    Knob { key: "solver.krylov.method", values: &[r#"{"gmres":{"restart":30}}"#], short: 1, dimensions: 1..=3 },
 ];
 
 /// Names of the knobs that are not keys with a default.
@@ -217,7 +217,8 @@ pub(super) fn one_at_a_time(problem: &dyn Problem, effort: Effort) -> Vec<Settin
 
 /// Whether a value of a scene equals the JSON: 3 is 3.0.
 fn is(value: &Value, json: &str) -> bool {
-    serde_json::from_str(json).is_ok_and(|other: Value| *value == other || (value.is_f64() && value.as_f64() == other.as_f64()))
+    serde_json::from_str(json)
+        .is_ok_and(|other: Value| *value == other || (value.is_f64() && value.as_f64() == other.as_f64()))
 }
 
 /// A value in which `$x` has become x c/h.
@@ -240,7 +241,8 @@ pub(super) const SHAPES: [(&str, &str); 6] = [
 
 /// Shape functions × ε × h × Δt.
 pub(super) fn design(problem: &dyn Problem, effort: Effort) -> Vec<Setting> {
-    let (shapes, lumpings, levels, courants): (&[usize], &[f64], &[usize], &[f64]) = match (effort, problem.dimension()) {
+    let (shapes, lumpings, levels, courants): (&[usize], &[f64], &[usize], &[f64]) = match (effort, problem.dimension())
+    {
         (Effort::Short, _) => (&[2, 4], &[1.0], &[1, 2], &[1.0]),
         (Effort::Full, 3) => (&[0, 1, 2, 4, 5], &[1.0, 0.1], &[1, 2], &[1.0]),
         (Effort::Full, _) => (&[0, 1, 2, 3, 4, 5], &[1.0, 0.1], &[1, 2, 3], &[2.0, 1.0]),
