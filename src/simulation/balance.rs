@@ -64,7 +64,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         }
         phi.iter_mut().zip(&nodal.motion).for_each(|(phi, before)| *phi += before);
         self.meet_obstacles(&equilibrium, prescribed, &mut phi)?;
-        let mut preconditioner = self.preconditioner().0.anew::<D>();
+        let mut preconditioner = self.preconditioner().0.build::<D>();
         let (mut cosine, mut dilatation) = (None, [Vec::new(), Vec::new()]);
         let newton = if scheme.follows_path() && !self.history.resets_grid() {
             let start = under(self.load());

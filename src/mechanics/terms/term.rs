@@ -81,7 +81,7 @@ pub(crate) trait Term<const D: usize>: Sync {
     }
 
     /// Adds the contribution at the nodes.
-    fn add_at_nodes<T: Number>(&self, _dphi: &[Vector<T, D>], _out: &mut [Vector<T, D>]) {}
+    fn add_at_nodes<T: Number>(&self, _phi: &[Vector<T, D>], _out: &mut [Vector<T, D>]) {}
 
     /// The contribution at the particles. Its [`Mode`] says which of u and L it reads, and which of q and σ it writes. Only the
     /// occurrences of φ in `part` carry derivatives.
@@ -96,13 +96,13 @@ pub(crate) trait Term<const D: usize>: Sync {
     fn energy<T: Number>(&self, phi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>>;
 
     /// Adds the magnitudes of the contributions of [`Self::add_at_nodes`].
-    fn add_magnitudes_at_nodes(&self, _dphi: &[Vector<f64, D>], _out: &mut [Vector<f64, D>]) {}
+    fn add_magnitudes_at_nodes(&self, _phi: &[Vector<f64, D>], _out: &mut [Vector<f64, D>]) {}
 
     /// Adds the change of the residual when φ and the state are rounded, in units of eps.
     ///
     /// # Errors
     /// det F ≤ 0 somewhere.
-    fn add_sensitivity(&self, _dphi: &[Vector<f64, D>], _out: &mut [Vector<f64, D>]) -> Result<(), Inadmissible> {
+    fn add_sensitivity(&self, _phi: &[Vector<f64, D>], _out: &mut [Vector<f64, D>]) -> Result<(), Inadmissible> {
         Ok(())
     }
 

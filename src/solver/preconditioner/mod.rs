@@ -87,7 +87,7 @@ impl Preconditioning {
     /// assert!(iterations(Preconditioning::BlockJacobi)? < iterations(Preconditioning::None)?);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn anew<const D: usize>(self) -> Box<dyn Preconditioner> {
+    pub fn build<const D: usize>(self) -> Box<dyn Preconditioner> {
         match self {
             Self::Automatic | Self::BlockJacobi => Box::new(BlockJacobi::<D>::default()),
             Self::Multigrid => Box::new(Multigrid::<D>::default()),

@@ -72,7 +72,7 @@ fn solve(simulation: &Simulation<3>, by: Preconditioning) -> Result<(LinearRepor
     let right: &[f64] = bytemuck::cast_slice(&right);
     let settings = ConjugateGradientSettings { relative_tolerance: SOLVE, max_iterations: 10_000 };
     let mut d = vec![0.0; right.len()];
-    let (start, mut preconditioner) = (Thread::now(), by.anew::<3>());
+    let (start, mut preconditioner) = (Thread::now(), by.build::<3>());
     let tangent = equilibrium.tangent(&dphi)?;
     let inverse = preconditioner.prepare(&tangent);
     let report = conjugate_gradient(&tangent, &*inverse, right, &mut d, &settings, &pool)?;
