@@ -221,9 +221,11 @@ impl<const D: usize> Recorder<D> {
             obstacles.write(&history::obstacles(time, &simulation.loads, &step.obstacles))?;
         }
         if let Some(table) = &mut self.contacts {
-            for ([one, other], contact) in pairs(simulation).zip(&step.pairs).filter(|(_, contact)| contact.area > 0.0)
-            {
-                table.write(&history::pair(time, [one, other], contact))?;
+            for (names, contact) in pairs(simulation).zip(&step.pairs) {
+                // The step in which a pair parts has a row, too, so that its force ends at zero.
+                if contact.area > 0.0 || touched::touched_last(&self.so_far.touched_pairs, &names.join(" and ")) {
+                    table.write(&history::pair(time, names, contact))?;
+                }
             }
         }
         let newton = &step.newton.history;

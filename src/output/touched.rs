@@ -28,6 +28,11 @@ pub struct Touched {
     pub friction_loss: f64,
 }
 
+/// Whether the obstacle or the pair of this name was in contact at the end of the last step.
+pub(crate) fn touched_last(touched: &[Touched], name: &str) -> bool {
+    touched.iter().any(|one| one.name == name && one.force.iter().any(|force| *force != 0.0))
+}
+
 /// Adds a step that ended at `time`.
 pub(crate) fn see<const D: usize>(
     touched: &mut Vec<Touched>,

@@ -222,6 +222,34 @@ fn a_body_does_not_pass_another_one_silently() -> Result<(), Failure> {
     Ok(())
 }
 
+/// A plate with a stem is pushed against a thin plate in load steps, at 0.9 to 3 spacings a step, straight and obliquely. The run ends with an
+/// error, or the plates still touch at its end.
+#[test]
+fn a_thin_plate_does_not_pass_another_one_in_load_steps() -> Result<(), Failure> {
+    let block = |min: [f64; 2], max: [f64; 2]| json!({ "box": { "min": min, "max": max } });
+    let held = |min: f64, max: f64| json!({ "region": block([min, 0.6], [max, 1.6]), "displacement": [[0, [0, 0]]] });
+    for (steps, way) in [(3, [0.0, -0.675]), (2, [0.0, -0.7]), (3, [0.5, -0.675]), (2, [0.0, -1.5])] {
+        for reset in ["every_step", "never"] {
+            let pushed = json!({ "union": [block([1.05, 1.225], [1.95, 1.35]), block([1.3, 1.33], [1.7, 3.9])] });
+            let mut simulation: Simulation<2> = built(&json!({
+                "grid": { "size": [3, 4], "spacing": 0.25, "reset": reset },
+                "time": { "step": 1.0 / f64::from(steps), "end": 1, "scheme": "none" },
+                "approximation": "linear",
+                "bodies": [solid("held", 1000, block([0.25, 1.0], [2.75, 1.125])), solid("pushed", 1000, pushed)],
+                "contact": {},
+                "prescribed": [held(0.0, 0.5), held(2.5, 3.0),
+                               { "region": block([0.0, 2.0], [3.0, 4.0]), "displacement": [[0, [0, 0]], [1, way]] }]
+            }))?;
+            let mut pushes = Some(0.0);
+            while simulation.clock.time() < 1.0 - 1e-9 && pushes.is_some() {
+                pushes = simulation.advance().ok().map(|step| step.pairs[0].force[1]);
+            }
+            assert!(pushes.is_none_or(|force| force > 0.0), "{way:?}, {reset}: {pushes:?}");
+        }
+    }
+    Ok(())
+}
+
 #[test]
 fn wrong_contact_between_bodies_is_refused() {
     let text = |changes: &[(&str, Value)]| with(discs(0.0), changes).to_string();
