@@ -187,10 +187,10 @@ impl<'a, const D: usize> Near<'a, D> {
 
     /// The largest depth at a point that is not nearer to the far side of its body.
     fn deepest(&self, place: &Place<D>) -> f64 {
-        *self.deepest[place.number].get_or_init(|| self.deepest_anew(place))
+        *self.deepest[place.number].get_or_init(|| self.find_deepest(place))
     }
 
-    fn deepest_anew(&self, place: &Place<D>) -> f64 {
+    fn find_deepest(&self, place: &Place<D>) -> f64 {
         let depth = |far: &Place<D>| place.normal.dot(&(place.ends[0] - far.ends[0]));
         let behind = |far: &&Place<D>| {
             let along = (place.ends[0] - far.ends[0]) - place.normal * depth(far);
@@ -237,10 +237,10 @@ impl<'a, const D: usize> Near<'a, D> {
 
     /// How near a point is to a convex edge of its body: 1 at the edge, 0 from half a cell on.
     fn edge(&self, place: &Place<D>) -> f64 {
-        *self.edges[place.number].get_or_init(|| self.edge_anew(place))
+        *self.edges[place.number].get_or_init(|| self.find_edge(place))
     }
 
-    fn edge_anew(&self, place: &Place<D>) -> f64 {
+    fn find_edge(&self, place: &Place<D>) -> f64 {
         let [smooth, sharp] = EDGE;
         let of = |other: &Place<D>| {
             let apart = other.ends[0] - place.ends[0];
