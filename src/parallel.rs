@@ -113,14 +113,7 @@ pub(crate) fn held<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 /// Calls `f(part)` for every part, each on any free thread.
 #[track_caller]
 pub(crate) fn for_each<P: Send>(parts: impl Iterator<Item = P>, f: &(dyn Fn(P) + Sync)) {
-    let parts: Vec<P> = parts.collect();
-    if records() {
-        record_region(Location::caller(), parts.into_iter(), f);
-    } else if parts.len() > 1 && several() {
-        parts.into_par_iter().for_each(f);
-    } else {
-        parts.into_iter().for_each(f);
-    }
+    collect(parts, f);
 }
 
 /// [`for_each`] with scratch space, which is reused from part to part.

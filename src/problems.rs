@@ -142,6 +142,12 @@ impl Problems {
         ok
     }
 
+    /// Checks that a number has a sensible size and is ≥ 0.
+    pub(crate) fn not_negative(&mut self, path: &str, x: f64) -> bool {
+        let is_number = self.number(path, x);
+        self.require(x >= 0.0, path, Number(x), "must be ≥ 0") && is_number
+    }
+
     /// Checks that a number lies between two numbers, both allowed.
     pub(crate) fn between(&mut self, path: &str, x: f64, min: f64, max: f64) -> bool {
         let ok = x >= min && x <= max;
@@ -152,6 +158,12 @@ impl Problems {
     /// Checks that a whole number lies between two numbers, both allowed.
     pub(crate) fn whole(&mut self, path: &str, n: u32, min: u32, max: u32) {
         self.require((min..=max).contains(&n), path, n, format_args!("must be a whole number from {min} to {max}"));
+    }
+
+    /// Checks that a list has 1 to `most` entries.
+    pub(crate) fn one_to<T>(&mut self, most: usize, path: &str, list: &[T]) -> bool {
+        let ok = (1..=most).contains(&list.len());
+        self.require(ok, path, format_args!("a list of {}", list.len()), format_args!("must have 1 to {most} entries"))
     }
 
     /// Checks the length of a list. A list that is too long is returned empty, so that its entries are not checked.

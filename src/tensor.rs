@@ -196,6 +196,11 @@ pub(crate) fn embed<T: Real, const D: usize>(a: &Tensor<T, D>) -> Tensor<T, 3> {
     Tensor::from_fn(|i, k| if i < D && k < D { a[(i, k)] } else { T::zero() })
 }
 
+/// The upper left D×D part.
+pub(crate) fn cut<T: Real, const D: usize>(a: &Tensor<T, 3>) -> Tensor<T, D> {
+    Tensor::from_fn(|i, k| a[(i, k)])
+}
+
 /// I₂(A), the sum of the principal 2×2 minors (0 in 1D, det A in 2D).
 #[inline(always)]
 pub(crate) fn second_invariant<T: Real, const D: usize>(a: &Tensor<T, D>) -> T {

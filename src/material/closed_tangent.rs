@@ -117,7 +117,7 @@ pub(super) fn rows<const D: usize>(a: &Tensor<f64, D>) -> [[f64; D]; D] {
 
 /// A tensor from its rows.
 #[inline(always)]
-fn tensor<const D: usize>(a: &[[f64; D]; D]) -> Tensor<f64, D> {
+pub(super) fn tensor<const D: usize>(a: &[[f64; D]; D]) -> Tensor<f64, D> {
     Tensor::from_fn(|i, k| a[i][k])
 }
 

@@ -1,7 +1,8 @@
 //! One family of fibres in an elastic matrix.
 
+use super::listed::elastic_base;
 use super::{Lame, Law, Listed, MaterialState, TangentBlocks, VolumeResponse};
-use crate::problems::{Number, Problems};
+use crate::problems::Problems;
 use crate::scalar::Real;
 use crate::tensor::{Deformation, Tensor, Vector, contract, outer, scaled};
 use schemars::JsonSchema;
@@ -126,15 +127,12 @@ impl<B: Listed> Listed for FibreReinforced<B> {
 
     fn build(given: &Self::Parameters, problems: &mut Problems, path: &str) -> Option<Self> {
         let at = |key: &str| format!("{path}.{key}");
-        let base = B::build(&given.base, problems, &at("base"));
-        let elastic = base.as_ref().is_none_or(|law| law.internal_variables().is_empty());
-        problems.require(elastic, &at("base"), "a law with memory", "must be an elastic law");
+        let base = elastic_base::<B>(&given.base, problems, path);
         let direction = Vector::<f64, 3>::from(given.direction);
         problems.vector(&at("direction"), &given.direction, 3);
         problems.require(direction.amax() > 0.0, &at("direction"), "0", "must have a length");
         problems.positive(&at("modulus"), given.modulus);
-        problems.number(&at("exponent"), given.exponent);
-        problems.require(given.exponent >= 0.0, &at("exponent"), Number(given.exponent), "must be ≥ 0");
+        problems.not_negative(&at("exponent"), given.exponent);
         // A direction of any length must not overflow.
         let direction = direction / direction.amax();
         base.and_then(|base| Self::new(base, direction, given.modulus, given.exponent))

@@ -13,12 +13,14 @@ mod parameters;
 pub(super) use parameters::Outside;
 pub use parameters::{CLawParameters, InternalVariables, MfrontParameters, TangentOf, UmatParameters, allow_library};
 
+use super::closed_tangent::{rows, tensor};
 use super::{InternalVariable, Law, MaterialState, TangentBlocks};
+use crate::parallel::held;
 use crate::scalar::Real;
-use crate::tensor::{Tensor, Vector, contract, embed, outer, symmetric};
+use crate::tensor::{Tensor, Vector, contract, cut, embed, outer, symmetric};
 use std::any::TypeId;
 use std::fmt;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 use tangent_check::convention::{self, Components, Configuration, Convention, ConversionFailed, Measure};
 use tangent_check::finding::{Entry, Verdict};
 use tangent_check::judge::check_columns;
@@ -54,34 +56,29 @@ struct Call {
 }
 
 /// The internal variables of a particle: those of the law come first. The others hold the state at t_n that a law may read.
-struct Layout {
-    /// The end of the law's own variables.
-    own: usize,
-    /// The end of the law's stress, in its own components.
-    stress: usize,
-    /// The end of the accumulated strain.
-    strain: usize,
-    /// The end of F, which is followed by the time, the number of steps, and the work of the stress.
-    gradient: usize,
+struct Stored<'a> {
+    /// The law's own variables.
+    own: &'a [f64],
+    /// The law's stress, in its own components.
+    stress: &'a [f64],
+    /// The accumulated strain.
+    strain: &'a [f64],
+    /// F, row by row.
+    gradient: &'a [f64],
+    time: f64,
+    /// The number of steps.
+    steps: f64,
+    /// The work of the stress.
+    work: f64,
 }
 
-impl Layout {
-    fn of(signature: &Signature) -> Self {
-        let own = signature.state_at_rest.len();
-        let stress = own + signature.convention.stress.count();
-        Self { own, stress, strain: stress + strains().count(), gradient: stress + strains().count() + 9 }
-    }
-
-    fn time(&self) -> usize {
-        self.gradient
-    }
-
-    fn steps(&self) -> usize {
-        self.gradient + 1
-    }
-
-    fn work(&self) -> usize {
-        self.gradient + 2
+impl<'a> Stored<'a> {
+    fn new(signature: &Signature, internal: &'a [f64]) -> Self {
+        let (own, rest) = internal.split_at(signature.state_at_rest.len());
+        let (stress, rest) = rest.split_at(signature.convention.stress.count());
+        let (strain, rest) = rest.split_at(strains().count());
+        let (gradient, others) = rest.split_at(9);
+        Self { own, stress, strain, gradient, time: others[0], steps: others[1], work: others[2] }
     }
 }
 
@@ -112,10 +109,6 @@ fn failed(error: ConversionFailed) -> CallFailed {
     CallFailed(error.0)
 }
 
-fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
 impl Calls {
     /// The response to F at the end of a step of length Δt, from the internal variables at its start. `None` if the call fails.
     fn respond<R>(
@@ -125,16 +118,16 @@ impl Calls {
         internal: &[f64],
         read: impl FnOnce(&Step, &Response) -> Result<R, CallFailed>,
     ) -> Option<R> {
-        let idle = locked(&self.idle).pop();
+        let idle = held(&self.idle).pop();
         let result = idle.map_or_else(|| self.new_call(), Ok).and_then(|mut call| {
             let result = self.start(&mut call.step, f, dt, internal).and_then(|()| {
                 call.caller.call(&call.step, &mut call.response)?;
                 read(&call.step, &call.response)
             });
-            locked(&self.idle).push(call);
+            held(&self.idle).push(call);
             result
         });
-        result.map_err(|CallFailed(sentence)| *locked(&self.failure) = Some(sentence)).ok()
+        result.map_err(|CallFailed(sentence)| *held(&self.failure) = Some(sentence)).ok()
     }
 
     fn new_call(&self) -> Result<Call, CallFailed> {
@@ -143,18 +136,16 @@ impl Calls {
 
     /// Writes the inputs of a step.
     fn start(&self, step: &mut Step, f: &convention::Tensor, dt: f64, internal: &[f64]) -> Result<(), CallFailed> {
-        let at = Layout::of(&self.signature);
-        step.state.clear();
-        step.state.extend_from_slice(&internal[..at.own]);
-        step.stress.clear();
-        step.stress.extend_from_slice(&internal[at.own..at.stress]);
-        step.strain = strains().symmetric_tensor(&internal[at.stress..at.strain]);
-        step.gradient_before = Components::rows().full_tensor(&internal[at.strain..at.gradient]);
+        let stored = Stored::new(&self.signature, internal);
+        stored.own.clone_into(&mut step.state);
+        stored.stress.clone_into(&mut step.stress);
+        step.strain = strains().symmetric_tensor(stored.strain);
+        step.gradient_before = Components::rows().full_tensor(stored.gradient);
         step.rotation = tangent_check::tensor::IDENTITY;
-        step.time = internal[at.time()];
+        step.time = stored.time;
         step.length = dt;
         // Laws may prepare their variables in the first step.
-        step.number = 1 + internal[at.steps()] as usize;
+        step.number = 1 + stored.steps as usize;
         if step.turn_to(f) { Ok(()) } else { Err(CallFailed("F has no polar decomposition.".to_owned())) }
     }
 
@@ -190,22 +181,9 @@ impl Calls {
     }
 }
 
-fn tensor(rows: &convention::Tensor) -> Tensor<f64, 3> {
-    Tensor::from_fn(|i, k| rows[i][k])
-}
-
-fn rows(tensor: &Tensor<f64, 3>) -> convention::Tensor {
-    std::array::from_fn(|i| std::array::from_fn(|k| tensor[(i, k)]))
-}
-
 /// F in three dimensions: the missing stretches are 1.
 fn gradient<T: Real, const D: usize>(at: &MaterialState<T, D>) -> convention::Tensor {
     rows(&(Tensor::identity() + embed(&at.h.map(Real::value))))
-}
-
-/// The upper left D×D part.
-fn cut<T: Real, const D: usize>(a: &Tensor<T, 3>) -> Tensor<T, D> {
-    Tensor::from_fn(|i, k| a[(i, k)])
 }
 
 impl Foreign {
@@ -238,11 +216,11 @@ impl Foreign {
     /// S and, for numbers that carry derivatives, ℂ.
     fn respond<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> Option<(Tensor<f64, 3>, Option<Matrix>)> {
         let (calls, internal, f) = (&*self.calls, self.internal(at), gradient(at));
-        let layout = Layout::of(&calls.signature);
+        let stored = Stored::new(&calls.signature, &internal);
         let plain = TypeId::of::<T>() == TypeId::of::<f64>();
         // At t_n itself the stress is known, and the law is not called: a step without a length may divide by it.
-        if plain && at.dt == 0.0 && f.as_flattened() == &internal[layout.strain..layout.gradient] {
-            return Some((calls.second_piola(&f, &internal[layout.own..layout.stress]).ok()?, None));
+        if plain && at.dt == 0.0 && f.as_flattened() == stored.gradient {
+            return Some((calls.second_piola(&f, stored.stress).ok()?, None));
         }
         calls.respond(&f, at.dt, &internal, |step, response| {
             let stress = calls.second_piola(&f, &response.stress)?;
@@ -265,15 +243,15 @@ impl Law for Foreign {
     /// W of the last step, plus ½ (P_n + P) : (F − F_n): the work of the stress, of which the law may dissipate a part.
     fn energy<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> T {
         let (calls, internal) = (&*self.calls, self.internal(at));
-        let layout = Layout::of(&calls.signature);
-        let f_n = Components::rows().full_tensor(&internal[layout.strain..layout.gradient]);
-        let before = calls.second_piola(&f_n, &internal[layout.own..layout.stress]).ok();
+        let stored = Stored::new(&calls.signature, &internal);
+        let f_n = Components::rows().full_tensor(stored.gradient);
+        let before = calls.second_piola(&f_n, stored.stress).ok();
         let Some((before, (stress, _))) = before.zip(self.respond(at)) else { return T::lit(f64::NAN) };
         let (f, f_n) = (tensor(&gradient(at)), tensor(&f_n));
         let work = 0.5 * contract(&(f_n * before + f * stress), &(f - f_n));
         let strain = embed::<T, D>(&at.green_lagrange());
         let moved = strain - strain.map(|x| T::lit(x.value()));
-        T::lit(internal[layout.work()] + work) + contract(&stress.map(T::lit), &moved)
+        T::lit(stored.work + work) + contract(&stress.map(T::lit), &moved)
     }
 
     fn stress<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> Tensor<T, D> {
@@ -312,13 +290,13 @@ impl Law for Foreign {
 
     fn update_variables<const D: usize>(&self, at: &MaterialState<f64, D>, variables: &mut [f64]) {
         let (calls, internal, f) = (&*self.calls, self.internal(at), gradient(at));
-        let layout = Layout::of(&calls.signature);
+        let stored = Stored::new(&calls.signature, &internal);
         let work = self.energy(at);
         let next = calls.respond(&f, at.dt, &internal, |step, response| {
             let strain = tangent_check::tensor::sum(&step.strain, 1.0, &step.strain_increment);
             let mut next = [&response.state[..], &response.stress[..], &strains().vector(&strain)].concat();
             next.extend(f.as_flattened());
-            next.extend([internal[layout.time()] + at.dt, internal[layout.steps()] + 1.0, work]);
+            next.extend([stored.time + at.dt, stored.steps + 1.0, work]);
             Ok(next)
         });
         let next = next.unwrap_or_else(|| vec![f64::NAN; variables.len()]);
@@ -361,16 +339,14 @@ impl Law for Foreign {
     }
 
     fn last_failure(&self) -> Option<String> {
-        locked(&self.calls.failure).take()
+        held(&self.calls.failure).take()
     }
 }
 
 impl fmt::Debug for Foreign {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Foreign")
-            .field("description", &self.calls.description)
-            .field("symmetric", &self.symmetric)
-            .finish()
+        let Self { calls, symmetric } = self;
+        f.debug_struct("Foreign").field("description", &calls.description).field("symmetric", symmetric).finish()
     }
 }
 

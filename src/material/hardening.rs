@@ -99,8 +99,7 @@ impl Hardening {
         let at = |key: &str| format!("{path}.{key}");
         let mut good = problems.positive(&at("initial"), initial);
         for (key, value) in [("linear", linear), ("rate", rate)] {
-            good &= problems.number(&at(key), value);
-            good &= problems.require(value >= 0.0, &at(key), Number(value), "must be ≥ 0");
+            good &= problems.not_negative(&at(key), value);
         }
         good &= problems.number(&at("saturation"), saturation);
         let allowed = format_args!("must be at least -initial = {}", Number(-initial));

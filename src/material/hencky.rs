@@ -7,7 +7,7 @@
 use super::spectral::{Function, Hencky, artanh_over, function, principal_axes};
 use super::{Lame, TangentBlocks};
 use crate::scalar::Real;
-use crate::tensor::{Deformation, Tensor, Vector, contract, embed, identity, outer, scaled, symmetric, trace};
+use crate::tensor::{Deformation, Tensor, Vector, contract, cut, embed, identity, outer, scaled, symmetric, trace};
 
 /// Rows and columns of the six numbers of a symmetric tensor.
 const SIX: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)];
@@ -19,11 +19,6 @@ fn six(numbers: &[f64]) -> Tensor<f64, 3> {
         (a[(i, k)], a[(k, i)]) = (x, x);
     }
     a
-}
-
-/// The upper left D×D part.
-fn cut<T: Real, const D: usize>(a: &Tensor<T, 3>) -> Tensor<T, D> {
-    Tensor::from_fn(|i, k| a[(i, k)])
 }
 
 /// ½ (b − I) = ½ (H + Hᵀ + H Hᵀ + F (C_i⁻¹ − I) Fᵀ), with no digit lost at small strain, from the six numbers of C_i⁻¹ − I.

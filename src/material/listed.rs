@@ -17,3 +17,12 @@ pub trait Listed: Law + Sized {
     /// constants are free.
     fn example(lame: Lame) -> Self;
 }
+
+/// The law at the key `base` below `path`, for a law over an elastic law. If it has a memory, `problems` says so.
+pub(super) fn elastic_base<B: Listed>(given: &B::Parameters, problems: &mut Problems, path: &str) -> Option<B> {
+    let path = format!("{path}.base");
+    let base = B::build(given, problems, &path);
+    let elastic = base.as_ref().is_none_or(|law| law.internal_variables().is_empty());
+    problems.require(elastic, &path, "a law with memory", "must be an elastic law");
+    base
+}

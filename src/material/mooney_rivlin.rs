@@ -89,8 +89,8 @@ impl Listed for MooneyRivlin {
         let Self { c1, c2, bulk } = *given;
         let at = |key: &str| format!("{path}.{key}");
         let mut good = problems.positive(&at("c1"), c1);
-        good &= problems.number(&at("c2"), c2) && problems.positive(&at("bulk"), bulk);
-        good &= problems.require(c2 >= 0.0, &at("c2"), Number(c2), "must be ≥ 0");
+        good &= problems.not_negative(&at("c2"), c2);
+        good &= problems.positive(&at("bulk"), bulk);
         let least = given.least_bulk();
         let allowed = format_args!("must be greater than 4/3 c1 + 16/3 c2 = {}", Number(least));
         let stiff = good && problems.require(bulk > least, &at("bulk"), Number(bulk), allowed);

@@ -117,9 +117,8 @@ impl Listed for Ogden {
     type Parameters = Self;
 
     fn build(given: &Self, problems: &mut Problems, path: &str) -> Option<Self> {
-        let (terms, count) = (format!("{path}.terms"), given.terms.len());
-        let few = format_args!("must have 1 to {MOST} entries");
-        let mut good = problems.require((1..=MOST).contains(&count), &terms, format_args!("a list of {count}"), few);
+        let terms = format!("{path}.terms");
+        let mut good = problems.one_to(MOST, &terms, &given.terms);
         for (i, OgdenTerm { modulus, exponent }) in given.terms.iter().enumerate().take(MOST) {
             let (of_modulus, of_exponent) = (format!("{terms}[{i}].modulus"), format!("{terms}[{i}].exponent"));
             good &= problems.number(&of_modulus, *modulus) && problems.between(&of_exponent, *exponent, -100.0, 100.0);

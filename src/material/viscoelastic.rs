@@ -1,6 +1,7 @@
 //! Finite viscoelasticity: Maxwell branches parallel to an elastic law.
 
 use super::hencky::{Principal, Radial, Strained};
+use super::listed::elastic_base;
 use super::{DISSIPATED, InternalVariable, Lame, Law, Listed, MaterialState, TangentBlocks, VolumeResponse};
 use crate::problems::Problems;
 use crate::scalar::Real;
@@ -168,13 +169,9 @@ impl<B: Listed> Listed for Viscoelastic<B> {
     type Parameters = ViscoelasticParameters<B::Parameters>;
 
     fn build(given: &Self::Parameters, problems: &mut Problems, path: &str) -> Option<Self> {
-        let (base, branches) = (format!("{path}.base"), format!("{path}.branches"));
-        let law = B::build(&given.base, problems, &base);
-        let elastic = law.as_ref().is_none_or(|law| law.internal_variables().is_empty());
-        problems.require(elastic, &base, "a law with memory", "must be an elastic law");
-        let count = given.branches.len();
-        let few = format_args!("must have 1 to {MOST} entries");
-        let mut good = problems.require((1..=MOST).contains(&count), &branches, format_args!("a list of {count}"), few);
+        let branches = format!("{path}.branches");
+        let law = elastic_base::<B>(&given.base, problems, path);
+        let mut good = problems.one_to(MOST, &branches, &given.branches);
         for (i, branch) in given.branches.iter().enumerate().take(MOST) {
             good &= problems.positive(&format!("{branches}[{i}].shear"), branch.shear);
             good &= problems.positive(&format!("{branches}[{i}].relaxation_time"), branch.relaxation_time);

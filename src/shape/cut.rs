@@ -1,7 +1,7 @@
 //! Cut cells: the volume and the centroid of the part of a box in a solid, and the surface in the box. A box is halved until the surface in
 //! it is nearly flat. Planes then cut the box into simplices, exactly.
 
-use super::{Face, GridBox, Shape};
+use super::{Face, GridBox, Shape, axis};
 use crate::tensor::{Tensor, Vector, determinant};
 
 /// The largest distance between a surface and the planes that approximate it, relative to the spacing. A ball two spacings in radius is
@@ -45,13 +45,8 @@ impl<const D: usize> Facet<D> {
         let normal = self.normal.normalize();
         let half = if D == 3 { 0.5 * self.area.sqrt() } else { 0.5 * self.area };
         // Tangents: the axes without their part along the normal, the one nearest to the normal left out.
-        let axes: Vec<Vector<f64, D>> = (0..D)
-            .filter(|&k| k != normal.iamax())
-            .map(|k| {
-                let axis = Vector::from_fn(|i, _| f64::from(i == k));
-                axis - normal * normal[k]
-            })
-            .collect();
+        let others = (0..D).filter(|&k| k != normal.iamax());
+        let axes: Vec<Vector<f64, D>> = others.map(|k| axis(k, 1.0) - normal * normal[k]).collect();
         let at = |shares: &[f64]| {
             axes.iter().zip(shares).fold(self.position, |x, (axis, share)| x + axis.normalize() * (half * share))
         };

@@ -50,13 +50,8 @@ impl<const D: usize> Shape<D> {
         let of_grid = Block { min: grid.origin, max: grid.position(grid.cells) };
         let (min, max) = self.bounding_box();
         let ends_inside = (0..D).all(|k| min[k] >= of_grid.min[k] && max[k] <= of_grid.max[k]);
-        let clipped;
-        let solid = if ends_inside {
-            self
-        } else {
-            clipped = Intersection(vec![self.clone(), of_grid.into()]).into();
-            &clipped
-        };
+        let own = self.clone();
+        let solid = if ends_inside { own } else { Intersection(vec![own, of_grid.into()]).into() };
         let mut segments = Vec::new();
         for ends in solid.surface_simplices(grid, edge).chunks_exact(D) {
             let (from, to) = (ends[0], ends[1]);

@@ -47,6 +47,12 @@ impl PolygonError {
     }
 }
 
+/// The part of an outline nearest to a point.
+enum OutlinePart {
+    Edge(usize),
+    Vertex(usize),
+}
+
 impl<const D: usize> Polygon<D> {
     /// The polygon of these vertices, in either order; `D` must be 2.
     ///
@@ -114,15 +120,7 @@ impl<const D: usize> Polygon<D> {
         let along = (b - a) / (b - a).norm();
         Vector::from_fn(|k, _| if k == 0 { along[1] } else { -along[0] })
     }
-}
 
-/// The part of an outline nearest to a point.
-enum OutlinePart {
-    Edge(usize),
-    Vertex(usize),
-}
-
-impl<const D: usize> Polygon<D> {
     fn nearest_part(&self, x: &Vector<f64, D>) -> OutlinePart {
         let n = self.vertices.len();
         let (mut squared, mut nearest) = (f64::INFINITY, (0, 0.0));

@@ -161,9 +161,7 @@ impl<const D: usize> Dual<'_, D> {
         }
         None
     }
-}
 
-impl<const D: usize> Dual<'_, D> {
     /// λ by the Nelder–Mead simplex search, accurate to about the square root of round-off.
     fn search(&self, start: Vector<f64, D>) -> Option<Vector<f64, D>> {
         let around = (0..D).map(|k| start + identity::<f64, D>().column(k));

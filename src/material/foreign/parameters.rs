@@ -1,12 +1,13 @@
 //! The keys of laws from shared libraries, and the permission to load a library.
 
 use super::Foreign;
+use crate::parallel::held;
 use crate::problems::Problems;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
+use std::sync::Mutex;
 use tangent_check::convention::Measure;
 use tangent_check::law::CallFailed;
 use tangent_check::library::{Description, Kind, StressState};
@@ -19,13 +20,12 @@ static ALLOWED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 pub fn allow_library(path: &Path) {
     // A path without a folder would be looked for in the folders of the system.
     let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
-    ALLOWED.lock().unwrap_or_else(PoisonError::into_inner).push(path);
+    held(&ALLOWED).push(path);
 }
 
 /// The path of an allowed library that ends with `name`.
 fn allowed(name: &Path) -> Option<PathBuf> {
-    let allowed = ALLOWED.lock().unwrap_or_else(PoisonError::into_inner);
-    allowed.iter().find(|path| path.ends_with(name)).cloned()
+    held(&ALLOWED).iter().find(|path| path.ends_with(name)).cloned()
 }
 
 /// The internal variables of a law that does not name them itself.
@@ -145,11 +145,8 @@ fn stress_state(plane_strain: bool) -> StressState {
 
 /// The keys of a law from a library.
 pub(crate) trait Outside {
-    /// The library and how to call it, with the path as the scene gives it.
-    fn description(&self) -> Description;
-
-    /// Whether the tangent has major symmetry.
-    fn symmetric(&self) -> bool;
+    /// The library and how to call it, with the path as the scene gives it, and whether the tangent has major symmetry.
+    fn description(&self) -> (Description, bool);
 
     /// Checks values that no type excludes. `false` if one is not allowed; `problems` then says why.
     fn check(&self, _problems: &mut Problems, _path: &str) -> bool {
@@ -161,32 +158,25 @@ pub(crate) trait Outside {
         if !self.check(problems, path) {
             return None;
         }
-        let (named, path) = (self.description(), format!("{path}.library"));
-        let shown = named.library.display();
+        let (named, symmetric) = self.description();
+        let (path, shown) = (format!("{path}.library"), named.library.display().to_string());
         let Some(library) = allowed(&named.library) else {
             let wanted = "must be allowed, because a scene is data and loads no code: add --allow-library PATH to the command line, in \
                           Python Scene(…, allow_libraries=[PATH])";
-            problems.refuse(&path, format_args!("{shown}"), wanted);
+            problems.refuse(&path, shown, wanted);
             return None;
         };
-        let opened = Foreign::open(Description { library, ..named.clone() }, self.symmetric());
-        opened
-            .map_err(|CallFailed(why)| {
-                problems.refuse(
-                    &path,
-                    format_args!("{shown}"),
-                    format_args!("must be a library that can be used: {why}"),
-                )
-            })
-            .ok()
+        let opened = Foreign::open(Description { library, ..named }, symmetric);
+        let unusable = |why| format!("must be a library that can be used: {why}");
+        opened.map_err(|CallFailed(why)| problems.refuse(&path, shown, unusable(why))).ok()
     }
 }
 
 impl Outside for UmatParameters {
-    fn description(&self) -> Description {
+    fn description(&self) -> (Description, bool) {
         let zeros = vec![0.0; self.state.names.len()];
         let at_rest = self.state.at_rest.as_ref().unwrap_or(&zeros);
-        Description {
+        let description = Description {
             library: self.library.clone(),
             kind: Kind::Umat {
                 material: self.name.clone(),
@@ -196,51 +186,41 @@ impl Outside for UmatParameters {
             properties: self.properties.clone(),
             state: self.state.names.iter().cloned().zip(at_rest.iter().copied()).collect(),
             stress_state: stress_state(self.plane_strain),
-        }
-    }
-
-    fn symmetric(&self) -> bool {
-        self.symmetric
+        };
+        (description, self.symmetric)
     }
 
     fn check(&self, problems: &mut Problems, path: &str) -> bool {
-        let (names, values) =
-            (self.state.names.len(), self.state.at_rest.as_ref().map_or(self.state.names.len(), Vec::len));
+        let names = self.state.names.len();
+        let values = self.state.at_rest.as_ref().map_or(names, Vec::len);
         let wanted = format_args!("must have a value for each of the {names} names");
-        problems.require(values == names, &format!("{path}.state.at_rest"), format_args!("a list of {values}"), wanted);
-        values == names
+        problems.require(values == names, &format!("{path}.state.at_rest"), format_args!("a list of {values}"), wanted)
     }
 }
 
 impl Outside for MfrontParameters {
-    fn description(&self) -> Description {
+    fn description(&self) -> (Description, bool) {
         let external = self.external.iter().map(|(name, value)| (name.clone(), *value)).collect();
-        Description {
+        let description = Description {
             library: self.library.clone(),
             kind: Kind::Mfront { name: self.behaviour.clone(), external },
             properties: self.properties.clone(),
             state: Vec::new(),
             stress_state: stress_state(self.plane_strain),
-        }
-    }
-
-    fn symmetric(&self) -> bool {
-        self.symmetric
+        };
+        (description, self.symmetric)
     }
 }
 
 impl Outside for CLawParameters {
-    fn description(&self) -> Description {
-        Description {
+    fn description(&self) -> (Description, bool) {
+        let description = Description {
             library: self.library.clone(),
             kind: Kind::C { name: self.law.clone() },
             properties: self.properties.clone(),
             state: Vec::new(),
             stress_state: StressState::Solid,
-        }
-    }
-
-    fn symmetric(&self) -> bool {
-        self.symmetric
+        };
+        (description, self.symmetric)
     }
 }

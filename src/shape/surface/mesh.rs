@@ -119,24 +119,15 @@ impl Mesh {
         (a + ab * (vb / sum) + ac * (vc / sum), Foot::Inside)
     }
 
-    /// The corners of the triangle nearest to `x`, and its part.
-    pub(crate) fn nearest_triangle(&self, x: &Vector3<f64>) -> Option<([Vector3<f64>; 3], Foot)> {
-        let (_, triangle, foot) = self.tree.nearest(x, |triangle| {
-            let (at, part) = self.foot(triangle, x);
-            ((x - at).norm_squared(), part)
-        })?;
-        Some((self.corners(triangle), foot))
-    }
-
-    /// d and ∇d. The normals of the triangles that meet at the nearest point decide the sign of d, each weighted by its angle (Bærentzen
-    /// and Aanæs, 2005).
-    pub(crate) fn nearest(&self, x: &Vector3<f64>) -> (f64, Vector3<f64>) {
+    /// d and ∇d, and the nearest triangle with the part of it that is nearest. The normals of the triangles that meet at the nearest point
+    /// decide the sign of d, each weighted by its angle (Bærentzen and Aanæs, 2005).
+    pub(crate) fn nearest(&self, x: &Vector3<f64>) -> (f64, Vector3<f64>, Option<(usize, Foot)>) {
         let distance = |triangle: usize| {
             let (at, part) = self.foot(triangle, x);
             ((x - at).norm_squared(), (x - at, part))
         };
         let Some((squared, triangle, (away, foot))) = self.tree.nearest(x, distance) else {
-            return (f64::INFINITY, Vector3::x());
+            return (f64::INFINITY, Vector3::x(), None);
         };
         let outward = match foot {
             Foot::Inside => self.normals[triangle],
@@ -151,6 +142,6 @@ impl Mesh {
             _ if squared > 0.0 => away / distance,
             _ => outward.try_normalize(0.0).unwrap_or_else(Vector3::x),
         };
-        (distance, direction)
+        (distance, direction, Some((triangle, foot)))
     }
 }

@@ -88,20 +88,22 @@ fn plane<const D: usize>(x: Vector3<f64>) -> Vector<f64, D> {
 
 impl<const D: usize> Solid<D> for Surface<D> {
     fn nearest(&self, x: &Vector<f64, D>) -> Face<D> {
-        let (distance, normal) = self.mesh.nearest(&space(x));
+        let (distance, normal, _) = self.mesh.nearest(&space(x));
         (distance, plane(normal))
     }
 
     fn feature(&self, x: &Vector<f64, D>) -> Feature<D> {
-        let face = self.nearest(x);
-        let Some((corners, foot)) = self.mesh.nearest_triangle(&space(x)) else { return Feature::plane(x, face) };
+        let (distance, normal, nearest) = self.mesh.nearest(&space(x));
+        let face = (distance, plane(normal));
+        let Some((triangle, foot)) = nearest else { return Feature::plane(x, face) };
+        let corners = self.mesh.corners(triangle);
         let corner = |i: usize| plane(corners[i % 3]);
         match foot {
             Foot::Inside => Feature::plane(x, face),
             Foot::Edge(i) => {
-                Feature::edge(corner(i), plane((corners[(i + 1) % 3] - corners[i]).normalize()), face.0.signum())
+                Feature::edge(corner(i), plane((corners[(i + 1) % 3] - corners[i]).normalize()), distance.signum())
             }
-            Foot::Vertex(i) => Feature::corner(corner(i), face.0.signum()),
+            Foot::Vertex(i) => Feature::corner(corner(i), distance.signum()),
         }
     }
 

@@ -1,5 +1,7 @@
 //! The data of an operator from which multigrid makes its coarse levels.
 
+use crate::aggregation::{Extension, Occupied, Pieces};
+use crate::space::Followers;
 use rustc_hash::FxHashMap;
 
 /// An operator as a form on the cells of a grid: Σ_cells ∇w:A∇u + m w·u at one point a cell, and Σ_nodes w·B u. Lengths are in cells.
@@ -51,6 +53,17 @@ impl LocalForm {
     /// Whether a value is no unknown, node after node.
     pub(super) fn fixed(&self) -> Vec<bool> {
         self.prescribed.iter().zip(&self.follows).map(|(held, follows)| *held || *follows).collect()
+    }
+
+    /// The outer nodes of hat functions, which follow inner ones except at `held` values. None if the form is not aggregated.
+    pub(in crate::solver::preconditioner) fn followers<const D: usize>(&self, held: &[bool]) -> Followers<D> {
+        if !self.aggregated {
+            return Followers::default();
+        }
+        let cells = self.cells.iter().copied().zip(self.filled.iter().copied()).collect();
+        let occupied = Occupied { dimension: D, grid: self.grid, nodes: &self.nodes, cells };
+        let held = held.iter().enumerate().filter(|(_, held)| **held).map(|(k, _)| (k / D, k % D));
+        Followers::new(Extension::new(Pieces::LINEAR, &occupied).into(), held)
     }
 
     /// Sums the cells into those of the next coarser grid. Returns for each coarse cell the cells in it.

@@ -2,7 +2,6 @@
 
 use super::form::LocalForm;
 use super::interpolation::Interpolation;
-use crate::aggregation::{Extension, Occupied, Pieces};
 use crate::parallel;
 use crate::solver::LinearOperator;
 use crate::solver::preconditioner::block_jacobi::multiply_blocks;
@@ -55,19 +54,6 @@ impl<const D: usize> LinearOperator for Level<D> {
         self.multiply(bytemuck::cast_slice(&extended), bytemuck::cast_slice_mut(y));
         self.followers.restrict::<f64>(bytemuck::cast_slice_mut(y));
         y.iter_mut().zip(&self.held).filter(|(_, held)| **held).for_each(|(y, _)| *y = 0.0);
-    }
-}
-
-impl<const D: usize> Level<D> {
-    /// K x
-    fn multiply(&self, x: &[Vector<f64, D>], y: &mut [Vector<f64, D>]) {
-        let rows = self.entries.chunks(ROWS).zip(self.neighbours.chunks(ROWS)).zip(y.chunks_mut(ROWS));
-        parallel::for_each(rows, &|((entries, neighbours), y): ((&[[_; 27]], &[[u32; 27]]), &mut [_])| {
-            for ((entries, neighbours), y) in entries.iter().zip(neighbours).zip(y) {
-                let existing = entries.iter().zip(neighbours).filter(|(_, node)| **node != NONE);
-                *y = existing.fold(Vector::zeros(), |sum, (entry, &node)| sum + entry * x[node as usize]);
-            }
-        });
     }
 }
 
@@ -212,14 +198,7 @@ impl<const D: usize> Level<D> {
     /// Lets outer nodes follow others, except at held values.
     fn follow(&mut self, form: &LocalForm, next: &mut LocalForm) {
         (next.aggregated, next.follows) = (form.aggregated, vec![false; D * next.nodes.len()]);
-        if !form.aggregated {
-            return;
-        }
-        let cells = next.cells.iter().copied().zip(next.filled.iter().copied()).collect();
-        let occupied = Occupied { dimension: D, grid: next.grid, nodes: &next.nodes, cells };
-        let extension = Extension::new(Pieces::LINEAR, &occupied);
-        let held = self.held.iter().enumerate().filter(|(_, held)| **held).map(|(k, _)| (k / D, k % D));
-        self.followers = Followers::new(extension.into(), held);
+        self.followers = next.followers(&self.held);
         for (outer, follows, _) in self.followers.rows() {
             next.follows[outer * D..(outer + 1) * D].copy_from_slice(&follows);
         }
@@ -272,6 +251,17 @@ impl<const D: usize> Level<D> {
         }
         let finite = |inverse: &Tensor<f64, D>| inverse.iter().all(|x| x.is_finite());
         self.inverse = blocks.iter().map(|block| Some(inverse(block)).filter(finite).unwrap_or(identity())).collect();
+    }
+
+    /// K x
+    fn multiply(&self, x: &[Vector<f64, D>], y: &mut [Vector<f64, D>]) {
+        let rows = self.entries.chunks(ROWS).zip(self.neighbours.chunks(ROWS)).zip(y.chunks_mut(ROWS));
+        parallel::for_each(rows, &|((entries, neighbours), y): ((&[[_; 27]], &[[u32; 27]]), &mut [_])| {
+            for ((entries, neighbours), y) in entries.iter().zip(neighbours).zip(y) {
+                let existing = entries.iter().zip(neighbours).filter(|(_, node)| **node != NONE);
+                *y = existing.fold(Vector::zeros(), |sum, (entry, &node)| sum + entry * x[node as usize]);
+            }
+        });
     }
 
     /// The block of K for two nodes; zero where they are not neighbours.

@@ -1,9 +1,7 @@
 //! The cells of a system in motions and pressures, and their volume changes under hat functions of the grid.
 
-use crate::aggregation::{Extension, Occupied, Pieces};
 use crate::solver::preconditioner::LocalForm;
 use crate::solver::preconditioner::hats::corners;
-use crate::space::Followers;
 use crate::tensor::{Tensor, Vector};
 use rustc_hash::{FxHashMap, FxHashSet};
 
@@ -46,20 +44,12 @@ impl PressureCells {
     /// v̂ of every cell: v²/(G B_c K_II⁻¹ B_cᵀ), divided by the median of its ratio to v in full cells.
     pub(super) fn effective_volumes(&self) -> Vec<f64> {
         let (cells, occupied) = (self, &self.occupied);
-        let full: FxHashSet<[u32; 3]> = occupied
-            .cells
-            .iter()
-            .zip(&occupied.filled)
-            .filter(|(_, filled)| **filled > FULL)
-            .map(|(cell, _)| *cell)
-            .collect();
+        let shares = occupied.cells.iter().zip(&occupied.filled);
+        let full: FxHashSet<[u32; 3]> = shares.filter(|(_, share)| **share > FULL).map(|(cell, _)| *cell).collect();
         let raw = |c: usize| cells.volume[c].powi(2) / (cells.shear[c] * cells.compliance[c]);
         let median = |chosen: &dyn Fn(usize) -> bool| {
-            let mut all: Vec<f64> = (0..cells.volume.len())
-                .filter(|&c| chosen(c))
-                .map(|c| raw(c) / cells.volume[c])
-                .filter(|x| x.is_finite() && *x > 0.0)
-                .collect();
+            let ratios = (0..cells.volume.len()).filter(|&c| chosen(c)).map(|c| raw(c) / cells.volume[c]);
+            let mut all: Vec<f64> = ratios.filter(|x| x.is_finite() && *x > 0.0).collect();
             all.sort_unstable_by(f64::total_cmp);
             all.get(all.len() / 2).copied()
         };
@@ -76,13 +66,7 @@ impl PressureCells {
         let (cells, occupied) = (self, &self.occupied);
         let numbers: FxHashMap<[u32; 3], u32> =
             (0..).zip(&occupied.nodes).map(|(number, &index)| (index, number)).collect();
-        let mut followers = Followers::<D>::default();
-        if occupied.aggregated {
-            let shares = occupied.cells.iter().copied().zip(occupied.filled.iter().copied()).collect();
-            let of = Occupied { dimension: D, grid: occupied.grid, nodes: &occupied.nodes, cells: shares };
-            let held = occupied.prescribed.iter().enumerate().filter(|(_, held)| **held).map(|(k, _)| (k / D, k % D));
-            followers = Followers::new(Extension::new(Pieces::LINEAR, &of).into(), held);
-        }
+        let followers = occupied.followers::<D>(&occupied.prescribed);
         let mut all: Vec<(u32, u32, Vector<f64, D>)> = Vec::new();
         for (cell, (index, centroid)) in cells.index.iter().zip(&cells.centroid).enumerate() {
             let volume_gradient = &cells.volume_gradient[cell * D * D..(cell + 1) * D * D];
