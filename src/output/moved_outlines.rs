@@ -61,8 +61,8 @@ impl<const D: usize> MovedOutlines<D> {
             points.extend(corners.iter().zip(next).flat_map(|(from, to)| [*from, *to]));
             bodies.resize(points.len(), f64::from(line.body));
         }
-        let name = Array { name: "body".into(), components: vec![String::new()], values: bodies, is_index: true };
-        Snapshot { time: snapshot.time, background: snapshot.background, points, arrays: vec![name], corners: 2 }
+        let arrays = vec![Array::scalar("body", bodies, true)];
+        Snapshot { time: snapshot.time, background: snapshot.background, points, arrays, corners: 2 }
     }
 }
 
