@@ -113,8 +113,7 @@ impl Curve {
             Self::Of(OtherCurve::Sine(sine)) => {
                 let path = format!("{path}.sine");
                 problems.positive(&format!("{path}.frequency"), sine.frequency);
-                let others = [("amplitude", sine.amplitude), ("phase", sine.phase), ("mean", sine.mean)];
-                for (key, number) in others.into_iter().filter_map(|(key, number)| Some((key, number?))) {
+                for (key, number) in [("amplitude", sine.amplitude), ("phase", sine.phase), ("mean", sine.mean)] {
                     problems.number(&format!("{path}.{key}"), number);
                 }
             }

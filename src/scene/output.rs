@@ -79,11 +79,8 @@ impl Output {
     }
 
     pub(super) fn check(&self, problems: &mut Problems, bodies: &[Body], grid: &GridBox) {
-        for (path, interval) in [("output.every", self.every), ("output.checkpoint", self.checkpoint)] {
-            if let Some(interval) = interval {
-                problems.positive(path, interval);
-            }
-        }
+        problems.positive("output.every", self.every);
+        problems.positive("output.checkpoint", self.checkpoint);
         let fields = self.fields.as_deref().unwrap_or_default();
         for (i, field) in problems.few("output.fields", fields).iter().enumerate() {
             let again = fields.iter().take(i).any(|earlier| earlier.name() == field.name());
