@@ -36,10 +36,8 @@ impl Display for BodyUse {
     fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
         let Self { name, particles, volume, mass, drawn } = self;
         write!(f, "{name}: {particles} particles, mass {mass:.6e}, volume {volume:.6}")?;
-        match drawn {
-            Some(drawn) => write!(f, "; its shape's is {drawn:.6}, {:+.2} %", 100.0 * (volume / drawn - 1.0)),
-            None => Ok(()),
-        }
+        let Some(drawn) = drawn else { return Ok(()) };
+        write!(f, "; its shape's is {drawn:.6}, {:+.2} %", 100.0 * (volume / drawn - 1.0))
     }
 }
 
