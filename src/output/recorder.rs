@@ -6,8 +6,6 @@ use super::files::Stream;
 use super::history::{self, Cost, Energies};
 use super::losses::Cause;
 use super::mark::Mark;
-use super::moved_outlines::MovedOutlines;
-use super::outlines::Outlines;
 use super::path::Point;
 use super::probes::{self, Probe};
 use super::progress::{Audience, Progress};
@@ -144,12 +142,7 @@ impl<const D: usize> Recorder<D> {
         }
         let written = so_far.snapshots.unwrap_or_default();
         let snapshots = snapshot_every
-            .map(|every| {
-                let outlines =
-                    (!loads.contacts.obstacles.is_empty()).then(|| Outlines::of(&loads.contacts, &simulation.grid));
-                let bodies = MovedOutlines::of(&simulation.particles, &reference, simulation.grid.spacing);
-                Snapshots::new(directory.clone(), &fields, outlines, loads.contacts.exist(), bodies, every, written)
-            })
+            .map(|every| Snapshots::new(directory.clone(), &fields, simulation, &reference, every, written))
             .transpose()?;
         Ok(Self {
             tables,
@@ -204,7 +197,7 @@ impl<const D: usize> Recorder<D> {
         self.so_far.counts.add(step);
         self.so_far.seconds.add(step);
         let line = report::newton_line(time, step).map_err(std::io::Error::from);
-        self.newton.line(&line.map_err(OutputError::io("write", self.newton.path()))?)?;
+        self.newton.line(&line.map_err(OutputError::io("write", &self.newton.path))?)?;
         self.write("reactions.csv", &history::reactions(time, &simulation.loads, &step.reactions))?;
         self.write("obstacles.csv", &history::obstacles(time, &simulation.loads, &step.obstacles))?;
         for (names, contact) in pairs(simulation).zip(&step.pairs).filter(|(_, contact)| contact.area > 0.0) {
@@ -307,7 +300,7 @@ impl<const D: usize> Recorder<D> {
             counts: self.so_far.counts,
         };
         self.progress.finish();
-        let log = self.newton.path();
+        let log = &self.newton.path;
         report::write(&self.directory.join("report.json"), log, asked, outcome, &summary)?;
         if !self.marked {
             std::fs::remove_file(log).map_err(OutputError::io("remove", log))?;

@@ -21,8 +21,6 @@ pub(crate) struct Snapshots<const D: usize> {
     fields: Vec<Field>,
     /// The obstacles, if there are any.
     outlines: Option<Outlines<D>>,
-    /// Whether surfaces may touch.
-    touches: bool,
     /// The outlines of the bodies, if pictures need them.
     bodies: Option<MovedOutlines<D>>,
     /// The entries of each of [`SERIES`].
@@ -82,12 +80,11 @@ impl SnapshotMark {
 impl<const D: usize> Snapshots<D> {
     /// Snapshots of `fields` in `directory`, due whenever the time passes a multiple of `every`. A repeated field is written once. The
     /// snapshots up to `mark` are continued.
-    pub(crate) fn new(
+    pub(crate) fn new<L, A>(
         directory: PathBuf,
         fields: &[Field],
-        outlines: Option<Outlines<D>>,
-        touches: bool,
-        bodies: Option<MovedOutlines<D>>,
+        simulation: &Simulation<D, L, A>,
+        reference: &Reference<D>,
         every: f64,
         mark: SnapshotMark,
     ) -> Result<Self, OutputError> {
@@ -96,14 +93,17 @@ impl<const D: usize> Snapshots<D> {
         }
         let unique = fields.iter().enumerate().filter(|&(k, field)| !fields[..k].contains(field));
         let mut entries = [const { String::new() }; SERIES.len()];
-        let is_written = [true, outlines.is_some(), touches, bodies.is_some()];
+        let (contacts, grid) = (&simulation.loads.contacts, &simulation.grid);
+        let outlines = (!contacts.obstacles.is_empty()).then(|| Outlines::of(contacts, grid));
+        let bodies = MovedOutlines::of(&simulation.particles, reference, grid.spacing);
+        let is_written = [true, outlines.is_some(), contacts.exist(), bodies.is_some()];
         for k in (0..SERIES.len()).filter(|&k| is_written[k] && mark.written > 0) {
             let path = pvd::file(&directory, SERIES[k]);
             entries[k] = pvd::first_entries(&path, mark.written)?;
             pvd::write(&path, &entries[k])?;
         }
         let fields = unique.map(|(_, field)| field.clone()).collect();
-        Ok(Self { fields, directory, outlines, touches, bodies, entries, every, mark })
+        Ok(Self { fields, directory, outlines, bodies, entries, every, mark })
     }
 
     /// Whether the time has reached a multiple of `every` since the last call that was due, or there was no such call.
@@ -131,7 +131,7 @@ impl<const D: usize> Snapshots<D> {
             let outlines = outlines.at(&simulation.loads.contacts, simulation.clock.time(), &particles);
             self.add(1, &outlines)?;
         }
-        if self.touches {
+        if simulation.loads.contacts.exist() {
             self.add(2, &surfaces::snapshot(simulation, &particles))?;
         }
         if let Some(bodies) = &self.bodies {
