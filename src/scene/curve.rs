@@ -139,20 +139,18 @@ impl Curve {
         }
     }
 
+    fn file(&self) -> Option<&CurveFile> {
+        if let Self::Of(OtherCurve::File(file)) = self { Some(file) } else { None }
+    }
+
     /// Reads the file of the curve, if it has one.
     pub(super) fn read(&self, folder: &Path) -> Result<(), FileError> {
-        match self {
-            Self::Of(OtherCurve::File(file)) => file.read(folder),
-            _ => Ok(()),
-        }
+        self.file().map_or(Ok(()), |file| file.read(folder))
     }
 
     /// The checksum of a file that has been read.
     pub(super) fn checksum(&self) -> Option<u32> {
-        match self {
-            Self::Of(OtherCurve::File(file)) => Some(hash(bytemuck::cast_slice(file.rows.get()?))),
-            _ => None,
-        }
+        Some(hash(bytemuck::cast_slice(self.file()?.rows.get()?)))
     }
 
     /// The curve.
