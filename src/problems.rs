@@ -36,10 +36,8 @@ impl Display for Problem {
         let separator = if self.path.is_empty() { "" } else { ": " };
         // Nobody reads a path through a hundred brackets.
         write!(f, "{}{separator}{}", cut(&self.path, PATH), cut(&self.message, MESSAGE))?;
-        match &self.place {
-            Some(place) => write!(f, "\n{place}"),
-            None => Ok(()),
-        }
+        let Some(place) = &self.place else { return Ok(()) };
+        write!(f, "\n{place}")
     }
 }
 
@@ -126,20 +124,18 @@ impl Problems {
         ok
     }
 
-    /// Checks that a number has a sensible size.
-    pub(crate) fn number(&mut self, path: &str, x: f64) -> bool {
-        let ok = sensible(x);
-        self.require(ok, path, Number(x), format_args!("must be finite and at most {LARGEST:e} in size"));
-        ok
+    /// Checks that a number has a sensible size. A number that is not given passes, here and below.
+    pub(crate) fn number(&mut self, path: &str, x: impl Into<Option<f64>>) -> bool {
+        let Some(x) = x.into() else { return true };
+        self.require(sensible(x), path, Number(x), format_args!("must be finite and at most {LARGEST:e} in size"))
     }
 
     /// Checks that a number has a sensible size and is > 0.
-    pub(crate) fn positive(&mut self, path: &str, x: f64) -> bool {
-        let ok = sensible(x) && x > 1.0 / LARGEST;
+    pub(crate) fn positive(&mut self, path: &str, x: impl Into<Option<f64>>) -> bool {
+        let Some(x) = x.into() else { return true };
         let bounds = format!("must be greater than {:e} and at most {LARGEST:e}", 1.0 / LARGEST);
         let allowed = if x > 0.0 { &bounds } else { "must be finite and > 0" };
-        self.require(ok, path, Number(x), allowed);
-        ok
+        self.require(sensible(x) && x > 1.0 / LARGEST, path, Number(x), allowed)
     }
 
     /// Checks that a number has a sensible size and is ≥ 0.
@@ -149,10 +145,10 @@ impl Problems {
     }
 
     /// Checks that a number lies between two numbers, both allowed.
-    pub(crate) fn between(&mut self, path: &str, x: f64, min: f64, max: f64) -> bool {
+    pub(crate) fn between(&mut self, path: &str, x: impl Into<Option<f64>>, min: f64, max: f64) -> bool {
+        let Some(x) = x.into() else { return true };
         let ok = x >= min && x <= max;
-        self.require(ok, path, Number(x), format_args!("must lie between {} and {}", Number(min), Number(max)));
-        ok
+        self.require(ok, path, Number(x), format_args!("must lie between {} and {}", Number(min), Number(max)))
     }
 
     /// Checks that a whole number lies between two numbers, both allowed.
@@ -176,8 +172,7 @@ impl Problems {
 
     /// Checks that a vector has one number of sensible size per dimension.
     pub(crate) fn vector(&mut self, path: &str, x: &[f64], dimension: usize) -> bool {
-        let right_length = self.length(path, x.len(), dimension);
-        let mut ok = right_length;
+        let mut ok = self.length(path, x.len(), dimension);
         for (k, &component) in x.iter().enumerate().take(3) {
             ok &= self.number(&format!("{path}[{k}]"), component);
         }
@@ -186,10 +181,8 @@ impl Problems {
 
     /// Checks that there is one entry per dimension.
     pub(crate) fn length(&mut self, path: &str, entries: usize, dimension: usize) -> bool {
-        let ok = entries == dimension;
         let allowed = format_args!("must have {dimension} components, as many as grid.size");
-        self.require(ok, path, format_args!("a vector of length {entries}"), allowed);
-        ok
+        self.require(entries == dimension, path, format_args!("a vector of length {entries}"), allowed)
     }
 }
 

@@ -37,10 +37,9 @@ pub(crate) fn see(
     names: &[&str],
 ) -> Vec<String> {
     let named = |shared_nodes: &SharedNodes| shared_nodes.bodies.map(|body| names[body as usize].to_owned());
-    for contact in contacts.iter_mut().filter(|contact| contact.until.is_none()) {
-        if !shared_nodes.iter().any(|one| named(one) == contact.bodies) {
-            contact.until = Some(time);
-        }
+    let is_over = |contact: &Contact| shared_nodes.iter().all(|one| named(one) != contact.bodies);
+    for contact in contacts.iter_mut().filter(|contact| contact.until.is_none() && is_over(contact)) {
+        contact.until = Some(time);
     }
     let mut said = Vec::new();
     for one in shared_nodes {
@@ -97,10 +96,8 @@ impl std::fmt::Display for Contact {
                 write!(f, "{a:?} and {b:?} shared nodes from t = {since} to {until}, at last at a gap of {gap}")?
             }
         }
-        match pulled_apart {
-            Some(time) => write!(f, "; pulled apart at t = {}, they stuck together", rounded(*time)),
-            None => Ok(()),
-        }
+        let Some(time) = pulled_apart else { return Ok(()) };
+        write!(f, "; pulled apart at t = {}, they stuck together", rounded(*time))
     }
 }
 

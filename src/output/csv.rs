@@ -35,7 +35,7 @@ impl Table {
         if let Some((column, _)) = row.iter().find(|(column, _)| !seen.insert(column)) {
             return Err(OutputError::DuplicateColumn { path, column: column.clone() });
         }
-        let header = row.iter().map(|(name, _)| quoted(name)).collect::<Vec<_>>().join(",");
+        let header = row.iter().map(|(name, _)| text(name)).collect::<Vec<_>>().join(",");
         if kept.is_some() {
             let mut line = String::new();
             let file = File::open(&path).and_then(|file| BufReader::new(file).read_line(&mut line));
@@ -56,11 +56,6 @@ impl Table {
     pub(crate) fn write(&mut self, row: &Row) -> Result<(), OutputError> {
         self.0.line(&row.iter().map(|(_, cell)| cell.as_str()).collect::<Vec<_>>().join(","))
     }
-}
-
-/// A name as a cell. A name that would break the row stands in quotes (RFC 4180).
-fn quoted(name: &str) -> String {
-    if name.contains([',', '"', '\n', '\r']) { format!("\"{}\"", name.replace('"', "\"\"")) } else { name.to_owned() }
 }
 
 #[cfg(test)]

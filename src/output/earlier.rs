@@ -4,7 +4,7 @@ use super::OutputError;
 use super::files::TEMPORARY;
 use super::mark::Mark;
 use super::plot::is_picture;
-use super::pvd::{BODIES, CONTACTS, OBSTACLES, SERIES};
+use super::pvd::SERIES;
 use super::snapshots::SnapshotMark;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -16,23 +16,17 @@ const HISTORY: &str = "history.csv";
 const START: &[u8] = b"step,time,";
 
 /// The files of a run, beside its snapshots and its pictures.
-const FILES: [&str; 11] = [
-    HISTORY,
-    "reactions.csv",
-    "obstacles.csv",
-    "contacts.csv",
-    "probes.csv",
-    "newton.jsonl",
-    "report.json",
-    SERIES,
-    OBSTACLES,
-    CONTACTS,
-    BODIES,
-];
+const FILES: [&str; 7] =
+    [HISTORY, "reactions.csv", "obstacles.csv", "contacts.csv", "probes.csv", "newton.jsonl", "report.json"];
+
+/// Whether a file of this name is a series of snapshots.
+fn is_series(name: &str) -> bool {
+    name.strip_suffix(".pvd").is_some_and(|series| SERIES.contains(&series))
+}
 
 /// Whether a run may write a file of this name.
 fn is_output(name: &str) -> bool {
-    FILES.contains(&name) || SnapshotMark::default().precedes(name) || is_picture(name)
+    FILES.contains(&name) || is_series(name) || SnapshotMark::default().precedes(name) || is_picture(name)
 }
 
 /// A file that a run would replace, in a directory without a history or report of this program.
@@ -115,15 +109,13 @@ fn last_row(history: &Path) -> Option<(u64, f64)> {
 /// new file.
 pub(super) fn remove_later_files(directory: &Path, mark: Option<&Mark>) -> Result<(), OutputError> {
     let snapshots = mark.and_then(|mark| mark.snapshots).unwrap_or_default();
-    let continued = |name: &str| {
-        mark.is_some_and(|mark| [SERIES, OBSTACLES, CONTACTS, BODIES].contains(&name) || mark.files.contains_key(name))
-    };
+    let continued = |name: &str| mark.is_some_and(|mark| is_series(name) || mark.files.contains_key(name));
     let entries = std::fs::read_dir(directory).map_err(OutputError::io("read", directory))?;
     for entry in entries {
         let entry = entry.map_err(OutputError::io("read", directory))?;
         let name = entry.file_name();
         let Some(name) = name.to_str() else { continue };
-        let file = FILES.contains(&name) && !continued(name);
+        let file = (FILES.contains(&name) || is_series(name)) && !continued(name);
         if file || is_picture(name) || snapshots.precedes(name) || name.starts_with(TEMPORARY) {
             std::fs::remove_file(entry.path()).map_err(OutputError::io("remove", &entry.path()))?;
         }

@@ -76,7 +76,7 @@ impl Written {
 /// A text file that grows line by line and is flushed every [`FLUSH_INTERVAL`], on [`Stream::flush`] and when dropped.
 #[derive(Debug)]
 pub(crate) struct Stream {
-    path: PathBuf,
+    pub(crate) path: PathBuf,
     writer: BufWriter<File>,
     /// Checksum of all bytes so far.
     sum: Hasher,
@@ -98,11 +98,6 @@ impl Stream {
         let action = if kept.is_some() { "continue" } else { "create" };
         let file = open().map_err(OutputError::io(action, &path))?;
         Ok(Self { path, writer: BufWriter::new(file), sum, length, flushed: Instant::now() })
-    }
-
-    /// Path of the file.
-    pub(crate) fn path(&self) -> &Path {
-        &self.path
     }
 
     /// Appends a line.
@@ -157,7 +152,7 @@ mod tests {
         stream.line("1")?;
         std::thread::sleep(FLUSH_INTERVAL);
         stream.line("2")?;
-        assert_eq!(std::fs::read_to_string(stream.path())?, "1\n2\n");
+        assert_eq!(std::fs::read_to_string(&stream.path)?, "1\n2\n");
         Ok(())
     }
 }

@@ -123,7 +123,7 @@ pub(crate) fn reactions<const D: usize>(time: f64, loads: &Loads<D>, reactions: 
     let mut row = vec![("time".to_owned(), cell(time))];
     for (condition, reaction) in loads.prescribed.iter().zip(reactions) {
         let name = &condition.name;
-        row.extend(AXES.iter().zip(&reaction.force).map(|(axis, force)| (format!("{name}_{axis}"), cell(force))));
+        row.extend(by_axis(name, &reaction.force));
         row.extend(condition.rotation().map(|_| (format!("{name}_torque"), cell(reaction.torque))));
     }
     row
@@ -149,23 +149,26 @@ pub(crate) fn obstacles<const D: usize>(time: f64, loads: &Loads<D>, contacts: &
 /// Adds the centre of mass of a free obstacle, its rotation vector (axis times angle), its velocity, its angular velocity, and its kinetic
 /// energy.
 fn add_free<const D: usize>(row: &mut Row, name: &str, body: &RigidBody<D>) {
-    let mut add = |what: &str, x: f64| row.push((format!("{name}_{what}"), cell(x)));
     let turned = Rotation3::from_matrix_unchecked(body.rotation).scaled_axis();
-    let (velocity, spin) = (&body.velocity, body.spin());
-    AXES.iter().zip(&body.position).for_each(|(axis, x)| add(&format!("position_{axis}"), *x));
-    AXES.iter().zip(velocity.iter().take(D)).for_each(|(axis, v)| add(&format!("velocity_{axis}"), *v));
+    row.extend(by_axis(&format!("{name}_position"), &body.position));
+    row.extend(by_axis(&format!("{name}_velocity"), body.velocity.iter().take(D)));
+    row.extend(axial::<D>(&format!("{name}_angle"), &turned));
+    row.extend(axial::<D>(&format!("{name}_spin"), &body.spin()));
+    row.push((format!("{name}_kinetic"), cell(body.kinetic_energy())));
+}
+
+/// A cell for each component of a vector.
+fn by_axis<'a>(name: &str, vector: impl IntoIterator<Item = &'a f64>) -> Row {
+    AXES.iter().zip(vector).map(|(axis, x)| (format!("{name}_{axis}"), cell(x))).collect()
+}
+
+/// The cells of a moment or a rotation: none in 1D, one in the plane, and one for each axis in space.
+fn axial<'a, const D: usize>(name: &str, vector: impl IntoIterator<Item = &'a f64>) -> Row {
     match D {
-        1 => {}
-        2 => {
-            add("angle", turned[2]);
-            add("spin", spin[2]);
-        }
-        _ => {
-            AXES.iter().zip(&turned).for_each(|(axis, x)| add(&format!("angle_{axis}"), *x));
-            AXES.iter().zip(&spin).for_each(|(axis, x)| add(&format!("spin_{axis}"), *x));
-        }
+        1 => Row::new(),
+        2 => vector.into_iter().skip(2).map(|x| (name.to_owned(), cell(x))).collect(),
+        _ => by_axis(name, vector),
     }
-    add("kinetic", body.kinetic_energy());
 }
 
 /// The row of a pair of bodies in `contacts.csv`, for a step that ended at `time`: the force and the moment on the second body, the area, the
@@ -180,13 +183,8 @@ pub(crate) fn pair<const D: usize>(time: f64, names: [&str; 2], contact: &Contac
 
 /// Adds force, moment, area and depth of a contact.
 fn add_contact<const D: usize>(row: &mut Row, prefix: &str, contact: &ContactForces<D>) {
-    let mut add = |what: &str, x: f64| row.push((format!("{prefix}{what}"), cell(x)));
-    AXES.iter().zip(&contact.force).for_each(|(axis, force)| add(axis, *force));
-    match D {
-        1 => {}
-        2 => add("moment", contact.moment[2]),
-        _ => AXES.iter().zip(contact.moment).for_each(|(axis, moment)| add(&format!("moment_{axis}"), moment)),
-    }
-    add("area", contact.area);
-    add("depth", contact.depth);
+    row.extend(AXES.iter().zip(&contact.force).map(|(axis, force)| (format!("{prefix}{axis}"), cell(force))));
+    row.extend(axial::<D>(&format!("{prefix}moment"), &contact.moment));
+    row.push((format!("{prefix}area"), cell(contact.area)));
+    row.push((format!("{prefix}depth"), cell(contact.depth)));
 }

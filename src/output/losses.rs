@@ -19,7 +19,14 @@ pub(crate) enum Cause {
 }
 
 impl Cause {
-    const ALL: [Self; 5] = [Self::Obstacle, Self::Wall, Self::Bodies, Self::NewGrid, Self::Step];
+    /// All causes, with the steps of each in words.
+    const ALL: [(Self, &'static str); 5] = [
+        (Self::Obstacle, "steps in which a body touches an obstacle or another body"),
+        (Self::Wall, "steps in which a body meets a wall (impact)"),
+        (Self::Bodies, "steps in which bodies share nodes (impact, or sticking)"),
+        (Self::NewGrid, "other steps with a new grid"),
+        (Self::Step, "steps without contact on a grid that is kept"),
+    ];
 
     /// The cause of losses in a step.
     pub(crate) fn of(touches: bool, feels_wall: bool, shares: bool, renewed: bool) -> Self {
@@ -29,17 +36,6 @@ impl Cause {
             (.., true, _) => Self::Bodies,
             (.., true) => Self::NewGrid,
             _ => Self::Step,
-        }
-    }
-
-    /// Steps of this kind, in words.
-    fn steps(self) -> &'static str {
-        match self {
-            Self::Obstacle => "steps in which a body touches an obstacle or another body",
-            Self::Wall => "steps in which a body meets a wall (impact)",
-            Self::Bodies => "steps in which bodies share nodes (impact, or sticking)",
-            Self::NewGrid => "other steps with a new grid",
-            Self::Step => "steps without contact on a grid that is kept",
         }
     }
 
@@ -113,8 +109,8 @@ impl Losses {
             Cause::ALL.into_iter().zip(self.by_cause).filter(|(_, by)| *by > 0.05 * lost).collect();
         causes.sort_by(|a, b| b.1.total_cmp(&a.1));
         let shares: Vec<_> =
-            causes.iter().map(|(cause, by)| format!("{:.0} % of it in {}", 100.0 * by / lost, cause.steps())).collect();
-        let cure = causes.first().map_or("", |(cause, _)| cause.cure(lumped));
+            causes.iter().map(|((_, steps), by)| format!("{:.0} % of it in {steps}", 100.0 * by / lost)).collect();
+        let cure = causes.first().map_or("", |((cause, _), _)| cause.cure(lumped));
         format!(
             "energy was lost, beyond what damping and laws took: {:.3e}, {:.1} % of the largest total energy {:.3e}; {}: {cure}",
             -self.balance,

@@ -16,15 +16,13 @@ const REACH: f64 = 0.5;
 #[derive(Debug)]
 struct Line<const D: usize> {
     body: u32,
-    corners: Vec<Corner<D>>,
+    /// The particles that move each corner.
+    corners: Vec<Vec<Part<D>>>,
 }
 
-/// A corner X of a line in the undeformed body. Its position is Σ w (x + F (X − X_p)), the mean of the linear motions of particles near it.
-#[derive(Debug)]
-struct Corner<const D: usize> {
-    /// Id, weight w and X − X_p for each of these particles.
-    carriers: Vec<(u32, f64, Vector<f64, D>)>,
-}
+/// The part of a particle in the motion of a corner X of the undeformed body: its id, its weight w, and X − X_p. The position of the corner
+/// is Σ w (x + F (X − X_p)), the mean of the linear motions of particles near it.
+type Part<const D: usize> = (u32, f64, Vector<f64, D>);
 
 /// The outlines of all bodies.
 #[derive(Debug)]
@@ -45,7 +43,7 @@ impl<const D: usize> MovedOutlines<D> {
                 .collect();
             // After a restart, the particles lie in another order.
             near.sort_unstable_by_key(|(id, _)| *id);
-            let corners = outline.corners.iter().map(|at| Corner::of(at, &near, REACH * spacing)).collect();
+            let corners = outline.corners.iter().map(|at| parts(at, &near, REACH * spacing)).collect();
             Line { body: outline.body, corners }
         });
         Some(Self(lines.collect()))
@@ -56,35 +54,34 @@ impl<const D: usize> MovedOutlines<D> {
         let places = particles.places();
         let (mut points, mut bodies) = (Vec::new(), Vec::new());
         for line in &self.0 {
-            let corners: Vec<[f64; 3]> = line.corners.iter().map(|corner| corner.moved(particles, &places)).collect();
+            let corners: Vec<[f64; 3]> = line.corners.iter().map(|corner| moved(corner, particles, &places)).collect();
             let next = corners.iter().cycle().skip(1);
             points.extend(corners.iter().zip(next).flat_map(|(from, to)| [*from, *to]));
             bodies.resize(points.len(), f64::from(line.body));
         }
-        let name = Array { name: "body".into(), components: vec![String::new()], values: bodies, is_index: true };
-        Snapshot { time: snapshot.time, background: snapshot.background, points, arrays: vec![name], corners: 2 }
+        let arrays = vec![Array::scalar("body", bodies, true)];
+        Snapshot { time: snapshot.time, background: snapshot.background, points, arrays, corners: 2 }
     }
 }
 
-impl<const D: usize> Corner<D> {
-    /// The corner at X = `at`, moved by some of the particles `near`: their ids and places X_p in the undeformed body.
-    fn of(at: &Vector<f64, D>, near: &[(u32, Vector<f64, D>)], reach: f64) -> Self {
-        let nearest = near.iter().map(|(_, x)| (at - x).norm()).fold(f64::INFINITY, f64::min);
-        // The weight falls to zero at the reach, so no corner jumps from one particle to another.
-        let weight = |distance: f64| (1.0 - (distance / (nearest + reach)).powi(2)).max(0.0).powi(2);
-        let weighted = near.iter().map(|(id, x)| (*id, weight((at - x).norm()), at - x));
-        let mut carriers: Vec<_> = weighted.filter(|(_, weight, _)| *weight > 0.0).collect();
-        let sum: f64 = carriers.iter().map(|(_, weight, _)| weight).sum();
-        carriers.iter_mut().for_each(|(_, weight, _)| *weight /= sum);
-        Self { carriers }
-    }
+/// The parts in the motion of the corner X = `at` of some of the particles `near`: their ids and places X_p in the undeformed body.
+fn parts<const D: usize>(at: &Vector<f64, D>, near: &[(u32, Vector<f64, D>)], reach: f64) -> Vec<Part<D>> {
+    let nearest = near.iter().map(|(_, x)| (at - x).norm()).fold(f64::INFINITY, f64::min);
+    // The weight falls to zero at the reach, so no corner jumps from one particle to another.
+    let weight = |distance: f64| (1.0 - (distance / (nearest + reach)).powi(2)).max(0.0).powi(2);
+    let weighted = near.iter().map(|(id, x)| (*id, weight((at - x).norm()), at - x));
+    let mut parts: Vec<Part<D>> = weighted.filter(|(_, weight, _)| *weight > 0.0).collect();
+    let sum: f64 = parts.iter().map(|(_, weight, _)| weight).sum();
+    parts.iter_mut().for_each(|(_, weight, _)| *weight /= sum);
+    parts
+}
 
-    fn moved(&self, particles: &Particles<D>, places: &[u32]) -> [f64; 3] {
-        let of = |(id, weight, from): &(u32, f64, Vector<f64, D>)| {
-            let p = places[*id as usize] as usize;
-            let f = identity::<f64, D>() + particles.displacement_gradient[p];
-            (particles.position[p] + f * from) * *weight
-        };
-        padded(&self.carriers.iter().map(of).sum::<Vector<f64, D>>())
-    }
+/// The position of a corner.
+fn moved<const D: usize>(parts: &[Part<D>], particles: &Particles<D>, places: &[u32]) -> [f64; 3] {
+    let of = |(id, weight, from): &Part<D>| {
+        let p = places[*id as usize] as usize;
+        let f = identity::<f64, D>() + particles.displacement_gradient[p];
+        (particles.position[p] + f * from) * *weight
+    };
+    padded(&parts.iter().map(of).sum::<Vector<f64, D>>())
 }

@@ -27,8 +27,8 @@ impl<const D: usize> Outlines<D> {
             points.extend(corners.iter().map(|corner| padded(&pose.to_space(corner))));
             numbers.resize(points.len(), number as f64);
         }
-        let name = Array { name: "obstacle".into(), components: vec![String::new()], values: numbers, is_index: true };
-        Snapshot { time: particles.time, background: particles.background, points, arrays: vec![name], corners: D }
+        let arrays = vec![Array::scalar("obstacle", numbers, true)];
+        Snapshot { time: particles.time, background: particles.background, points, arrays, corners: D }
     }
 }
 

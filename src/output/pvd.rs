@@ -5,17 +5,14 @@ use super::files::{read_if_there, write_atomically};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// The file of the series, in the directory of the run.
-pub(crate) const SERIES: &str = "particles.pvd";
+/// The series of a run: particles, obstacles, surfaces that may touch, and outlines of bodies. The first is `particles.pvd` with the files
+/// `particles_000000.vtu`, …
+pub(crate) const SERIES: [&str; 4] = ["particles", "obstacles", "contacts", "bodies"];
 
-/// The series of the obstacles.
-pub(crate) const OBSTACLES: &str = "obstacles.pvd";
-
-/// The series of the outlines of bodies.
-pub(crate) const BODIES: &str = "bodies.pvd";
-
-/// The series of the surfaces that may touch.
-pub(crate) const CONTACTS: &str = "contacts.pvd";
+/// The file of a series.
+pub(crate) fn file(directory: &Path, series: &str) -> PathBuf {
+    directory.join(format!("{series}.pvd"))
+}
 
 /// Text before and after the entries.
 const HEAD: &str = "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\" byte_order=\"LittleEndian\">\n<Collection>\n";
@@ -42,9 +39,9 @@ pub(crate) fn first_entries(path: &Path, count: usize) -> Result<String, OutputE
     Ok(kept.concat())
 }
 
-/// The existing files of the series in `directory`, in order of time; empty if there is no series.
+/// The existing files of the particles in `directory`, in order of time; empty if there is no series.
 pub(crate) fn files(directory: &Path) -> Result<Vec<PathBuf>, OutputError> {
-    let path = directory.join(SERIES);
+    let path = file(directory, SERIES[0]);
     let Some(series) = read_if_there(&path)? else { return Ok(Vec::new()) };
     let series = String::from_utf8_lossy(&series);
     let names = series.split("file=\"").skip(1).filter_map(|rest| rest.split('"').next());
@@ -87,9 +84,10 @@ mod tests {
     fn a_series_without_files_is_damaged_and_none_is_none() -> Result<(), Box<dyn std::error::Error>> {
         let folder = tempfile::tempdir()?;
         assert!(files(folder.path())?.is_empty());
-        std::fs::write(folder.path().join(SERIES), "<VTKFile>")?;
+        let series = folder.path().join("particles.pvd");
+        std::fs::write(&series, "<VTKFile>")?;
         assert!(files(folder.path()).is_err());
-        std::fs::write(folder.path().join(SERIES), r#"<DataSet file="a.vtu"/><DataSet part="0" file="b.vtu"/>"#)?;
+        std::fs::write(&series, r#"<DataSet file="a.vtu"/><DataSet part="0" file="b.vtu"/>"#)?;
         assert!(files(folder.path())?.is_empty());
         std::fs::write(folder.path().join("b.vtu"), "")?;
         assert_eq!(files(folder.path())?, [folder.path().join("b.vtu")]);

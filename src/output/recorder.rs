@@ -6,8 +6,6 @@ use super::files::Stream;
 use super::history::{self, Cost, Energies};
 use super::losses::Cause;
 use super::mark::Mark;
-use super::moved_outlines::MovedOutlines;
-use super::outlines::Outlines;
 use super::path::Point;
 use super::probes::{self, Probe};
 use super::progress::{Audience, Progress};
@@ -22,6 +20,7 @@ use crate::material::Law;
 use crate::mechanics::loads::Reaction;
 use crate::simulation::{ContactForces, Simulation, StepReport};
 use serde_json::{Map, Value};
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -62,12 +61,9 @@ pub struct OutputSettings<const D: usize> {
 pub struct Recorder<const D: usize> {
     directory: PathBuf,
     reference: Reference<D>,
-    history: Table,
-    reactions: Option<Table>,
-    obstacles: Option<Table>,
-    contacts: Option<Table>,
+    /// The tables of this run, by the names of their files.
+    tables: BTreeMap<&'static str, Table>,
     probes: Vec<Probe<D>>,
-    probed: Option<Table>,
     snapshots: Option<Snapshots<D>>,
     newton: Stream,
     progress: Progress,
@@ -129,40 +125,28 @@ impl<const D: usize> Recorder<D> {
         });
         // A file that is not in the mark is created anew.
         let kept = |name: &str| so_far.files.get(name).copied();
-        let table = |name: &str, row: &Row| Table::open(directory.join(name), row, kept(name));
-        // Only the names of the columns are needed here.
-        let history = table("history.csv", &history::row(simulation, &Energies::default(), Cost::default()))?;
         let loads = &simulation.loads;
         let no_reactions = vec![Reaction::NONE; loads.prescribed.len()];
-        let reactions = (!loads.prescribed.is_empty())
-            .then(|| table("reactions.csv", &history::reactions(0.0, loads, &no_reactions)))
-            .transpose()?;
         let untouched = vec![ContactForces::NONE; loads.contacts.obstacles.len()];
-        let obstacles = (!untouched.is_empty())
-            .then(|| table("obstacles.csv", &history::obstacles(0.0, loads, &untouched)))
-            .transpose()?;
-        let contacts = (loads.contacts.between.is_some())
-            .then(|| table("contacts.csv", &history::pair(0.0, [""; 2], &ContactForces::<D>::NONE)))
-            .transpose()?;
-        let probed = (!probes.is_empty())
-            .then(|| table("probes.csv", &probes::row(&probes, simulation, &reference)?))
-            .transpose()?;
+        // Only the names of the columns are needed here.
+        let rows = [
+            ("history.csv", true, history::row(simulation, &Energies::default(), Cost::default())),
+            ("reactions.csv", !no_reactions.is_empty(), history::reactions(0.0, loads, &no_reactions)),
+            ("obstacles.csv", !untouched.is_empty(), history::obstacles(0.0, loads, &untouched)),
+            ("contacts.csv", loads.contacts.between.is_some(), history::pair(0.0, [""; 2], &ContactForces::<D>::NONE)),
+            ("probes.csv", !probes.is_empty(), probes::row(&probes, simulation, &reference)?),
+        ];
+        let mut tables = BTreeMap::new();
+        for (name, _, row) in rows.iter().filter(|(_, is_written, _)| *is_written) {
+            tables.insert(*name, Table::open(directory.join(name), row, kept(name))?);
+        }
         let written = so_far.snapshots.unwrap_or_default();
         let snapshots = snapshot_every
-            .map(|every| {
-                let outlines =
-                    (!loads.contacts.obstacles.is_empty()).then(|| Outlines::of(&loads.contacts, &simulation.grid));
-                let bodies = MovedOutlines::of(&simulation.particles, &reference, simulation.grid.spacing);
-                Snapshots::new(directory.clone(), &fields, outlines, loads.contacts.exist(), bodies, every, written)
-            })
+            .map(|every| Snapshots::new(directory.clone(), &fields, simulation, &reference, every, written))
             .transpose()?;
         Ok(Self {
-            history,
-            reactions,
-            obstacles,
-            contacts,
+            tables,
             probes,
-            probed,
             snapshots,
             newton: Stream::open(directory.join("newton.jsonl"), kept("newton.jsonl"))?,
             progress: Progress::new(simulation.clock.time(), end_time, audience),
@@ -213,19 +197,13 @@ impl<const D: usize> Recorder<D> {
         self.so_far.counts.add(step);
         self.so_far.seconds.add(step);
         let line = report::newton_line(time, step).map_err(std::io::Error::from);
-        self.newton.line(&line.map_err(OutputError::io("write", self.newton.path()))?)?;
-        if let Some(reactions) = &mut self.reactions {
-            reactions.write(&history::reactions(time, &simulation.loads, &step.reactions))?;
-        }
-        if let Some(obstacles) = &mut self.obstacles {
-            obstacles.write(&history::obstacles(time, &simulation.loads, &step.obstacles))?;
-        }
-        if let Some(table) = &mut self.contacts {
-            for (names, contact) in pairs(simulation).zip(&step.pairs) {
-                // The step in which a pair parts has a row, too, so that its force ends at zero.
-                if contact.area > 0.0 || touched::touched_last(&self.so_far.touched_pairs, &names.join(" and ")) {
-                    table.write(&history::pair(time, names, contact))?;
-                }
+        self.newton.line(&line.map_err(OutputError::io("write", &self.newton.path))?)?;
+        self.write("reactions.csv", &history::reactions(time, &simulation.loads, &step.reactions))?;
+        self.write("obstacles.csv", &history::obstacles(time, &simulation.loads, &step.obstacles))?;
+        for (names, contact) in pairs(simulation).zip(&step.pairs) {
+            // The step in which a pair parts has a row, too, so that its force ends at zero.
+            if contact.area > 0.0 || touched::touched_last(&self.so_far.touched_pairs, &names.join(" and ")) {
+                self.write("contacts.csv", &history::pair(time, names, contact))?;
             }
         }
         let newton = &step.newton.history;
@@ -268,12 +246,8 @@ impl<const D: usize> Recorder<D> {
         let contacts = &simulation.loads.contacts;
         let obstacles = contacts.obstacles.iter().map(|obstacle| obstacle.name.clone());
         touched::see(&mut self.so_far.touched, time, obstacles, &step.obstacles);
-        touched::see(
-            &mut self.so_far.touched_pairs,
-            time,
-            pairs(simulation).map(|names| names.join(" and ")),
-            &step.pairs,
-        );
+        let names = pairs(simulation).map(|names| names.join(" and "));
+        touched::see(&mut self.so_far.touched_pairs, time, names, &step.pairs);
         for (obstacle, contact) in contacts.obstacles.iter().zip(&step.obstacles) {
             let place = format!("in the obstacle {:?}", obstacle.name);
             self.so_far.watch.see_depth(seen, &place, "obstacles[].stiffness", contact.depth / simulation.grid.spacing);
@@ -329,7 +303,7 @@ impl<const D: usize> Recorder<D> {
             counts: self.so_far.counts,
         };
         self.progress.finish();
-        let log = self.newton.path();
+        let log = &self.newton.path;
         report::write(&self.directory.join("report.json"), log, asked, outcome, &summary)?;
         if !self.marked {
             std::fs::remove_file(log).map_err(OutputError::io("remove", log))?;
@@ -343,10 +317,8 @@ impl<const D: usize> Recorder<D> {
         cost: Cost,
     ) -> Result<Energies, OutputError> {
         let energies = Energies::of(simulation, &self.reference);
-        self.history.write(&history::row(simulation, &energies, cost))?;
-        if let Some(table) = &mut self.probed {
-            table.write(&probes::row(&self.probes, simulation, &self.reference)?)?;
-        }
+        self.write("history.csv", &history::row(simulation, &energies, cost))?;
+        self.write("probes.csv", &probes::row(&self.probes, simulation, &self.reference)?)?;
         if let Some(snapshots) = &mut self.snapshots
             && snapshots.is_due(&simulation.clock)
         {
@@ -355,20 +327,18 @@ impl<const D: usize> Recorder<D> {
         Ok(energies)
     }
 
+    /// Appends a row to a table, if the run has this table.
+    fn write(&mut self, table: &str, row: &Row) -> Result<(), OutputError> {
+        self.tables.get_mut(table).map_or(Ok(()), |table| table.write(row))
+    }
+
     fn flush(&mut self) -> Result<(), OutputError> {
         self.streams().try_for_each(Stream::flush)
     }
 
     /// All files that grow line by line.
     fn streams(&mut self) -> impl Iterator<Item = &mut Stream> {
-        let tables = [
-            Some(&mut self.history),
-            self.reactions.as_mut(),
-            self.obstacles.as_mut(),
-            self.contacts.as_mut(),
-            self.probed.as_mut(),
-        ];
-        std::iter::once(&mut self.newton).chain(tables.into_iter().flatten().map(|table| &mut table.0))
+        std::iter::once(&mut self.newton).chain(self.tables.values_mut().map(|table| &mut table.0))
     }
 }
 

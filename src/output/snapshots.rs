@@ -4,7 +4,7 @@
 use super::fields::padded;
 use super::moved_outlines::MovedOutlines;
 use super::outlines::Outlines;
-use super::pvd::{self, BODIES, CONTACTS, OBSTACLES, SERIES};
+use super::pvd::{self, SERIES};
 use super::vtu::{Array, Background, Snapshot};
 use super::{OutputError, Reference, surfaces};
 use crate::clock::Clock;
@@ -21,12 +21,10 @@ pub(crate) struct Snapshots<const D: usize> {
     fields: Vec<Field>,
     /// The obstacles, if there are any.
     outlines: Option<Outlines<D>>,
-    /// Whether surfaces may touch.
-    touches: bool,
     /// The outlines of the bodies, if pictures need them.
     bodies: Option<MovedOutlines<D>>,
-    /// The entries of the series of particles, obstacles, surfaces and outlines of bodies.
-    entries: [String; 4],
+    /// The entries of each of [`SERIES`].
+    entries: [String; SERIES.len()],
     /// Time between snapshots.
     every: f64,
     pub(crate) mark: SnapshotMark,
@@ -43,27 +41,15 @@ pub(crate) struct SnapshotMark {
     passed: Option<f64>,
 }
 
-/// File names of a snapshot of particles begin with this, and of one of obstacles, of surfaces and of outlines of bodies.
-const STEMS: [&str; 4] = ["particles_", "obstacles_", "contacts_", "bodies_"];
-
-/// File names of a snapshot of particles, of obstacles, of surfaces and of outlines of bodies.
-fn names(number: usize) -> [String; 4] {
-    STEMS.map(|stem| format!("{stem}{number:06}.vtu"))
+/// The name of a file of a series.
+fn name(series: &str, number: usize) -> String {
+    format!("{series}_{number:06}.vtu")
 }
 
-/// The file of the obstacles beside a file of particles.
-pub(crate) fn obstacles_beside(particles: &Path) -> Option<PathBuf> {
-    beside(particles, STEMS[1])
-}
-
-/// The file of the outlines of bodies beside a file of particles.
-pub(crate) fn bodies_beside(particles: &Path) -> Option<PathBuf> {
-    beside(particles, STEMS[3])
-}
-
-fn beside(particles: &Path, stem: &str) -> Option<PathBuf> {
-    let name = particles.file_name()?.to_str()?.strip_prefix(STEMS[0])?;
-    Some(particles.with_file_name(format!("{stem}{name}"))).filter(|path| path.is_file())
+/// The file of another series at the time of a file of particles, if there is one.
+pub(crate) fn beside(particles: &Path, series: &str) -> Option<PathBuf> {
+    let end = particles.file_name()?.to_str()?.strip_prefix(SERIES[0])?;
+    Some(particles.with_file_name(format!("{series}{end}"))).filter(|path| path.is_file())
 }
 
 impl SnapshotMark {
@@ -71,19 +57,20 @@ impl SnapshotMark {
     pub(crate) fn check(&self, directory: &Path) -> Result<(), OutputError> {
         // Nothing is written before the first snapshot.
         if self.written > 0 {
-            pvd::first_entries(&directory.join(SERIES), self.written)?;
+            pvd::first_entries(&pvd::file(directory, SERIES[0]), self.written)?;
         }
         Ok(())
     }
 
     /// The written snapshots that are not in `directory`.
     pub(crate) fn missing(&self, directory: &Path) -> Vec<PathBuf> {
-        (0..self.written).map(|number| directory.join(&names(number)[0])).filter(|path| !path.is_file()).collect()
+        let files = (0..self.written).map(|number| directory.join(name(SERIES[0], number)));
+        files.filter(|path| !path.is_file()).collect()
     }
 
     /// Whether a file of this name is a snapshot that was written later.
     pub(crate) fn precedes(&self, name: &str) -> bool {
-        let rest = STEMS.iter().find_map(|stem| name.strip_prefix(stem));
+        let rest = SERIES.iter().find_map(|series| name.strip_prefix(series)?.strip_prefix('_'));
         let number = rest.and_then(|rest| rest.strip_suffix(".vtu"));
         let digits = number.filter(|number| number.len() >= 6 && number.bytes().all(|b| b.is_ascii_digit()));
         digits.is_some_and(|digits| digits.parse().map_or(true, |number: usize| number >= self.written))
@@ -93,12 +80,11 @@ impl SnapshotMark {
 impl<const D: usize> Snapshots<D> {
     /// Snapshots of `fields` in `directory`, due whenever the time passes a multiple of `every`. A repeated field is written once. The
     /// snapshots up to `mark` are continued.
-    pub(crate) fn new(
+    pub(crate) fn new<L, A>(
         directory: PathBuf,
         fields: &[Field],
-        outlines: Option<Outlines<D>>,
-        touches: bool,
-        bodies: Option<MovedOutlines<D>>,
+        simulation: &Simulation<D, L, A>,
+        reference: &Reference<D>,
         every: f64,
         mark: SnapshotMark,
     ) -> Result<Self, OutputError> {
@@ -106,17 +92,18 @@ impl<const D: usize> Snapshots<D> {
             return Err(OutputError::SnapshotEvery(every));
         }
         let unique = fields.iter().enumerate().filter(|&(k, field)| !fields[..k].contains(field));
-        let mut entries = [const { String::new() }; 4];
-        let (of_obstacles, of_bodies) = (outlines.as_ref().map(|_| OBSTACLES), bodies.as_ref().map(|_| BODIES));
-        let series = [Some(SERIES), of_obstacles, touches.then_some(CONTACTS), of_bodies];
-        for (entries, series) in entries.iter_mut().zip(series).filter(|_| mark.written > 0) {
-            let Some(series) = series else { continue };
-            let path = directory.join(series);
-            *entries = pvd::first_entries(&path, mark.written)?;
-            pvd::write(&path, entries)?;
+        let mut entries = [const { String::new() }; SERIES.len()];
+        let (contacts, grid) = (&simulation.loads.contacts, &simulation.grid);
+        let outlines = (!contacts.obstacles.is_empty()).then(|| Outlines::of(contacts, grid));
+        let bodies = MovedOutlines::of(&simulation.particles, reference, grid.spacing);
+        let is_written = [true, outlines.is_some(), contacts.exist(), bodies.is_some()];
+        for k in (0..SERIES.len()).filter(|&k| is_written[k] && mark.written > 0) {
+            let path = pvd::file(&directory, SERIES[k]);
+            entries[k] = pvd::first_entries(&path, mark.written)?;
+            pvd::write(&path, &entries[k])?;
         }
         let fields = unique.map(|(_, field)| field.clone()).collect();
-        Ok(Self { fields, directory, outlines, touches, bodies, entries, every, mark })
+        Ok(Self { fields, directory, outlines, bodies, entries, every, mark })
     }
 
     /// Whether the time has reached a multiple of `every` since the last call that was due, or there was no such call.
@@ -139,29 +126,29 @@ impl<const D: usize> Snapshots<D> {
         if self.mark.last == Some(step) {
             return Ok(());
         }
-        let [file, of_obstacles, of_surfaces, of_bodies] = names(self.mark.written);
         let particles = snapshot(simulation, reference, &self.fields)?;
         if let Some(outlines) = &self.outlines {
             let outlines = outlines.at(&simulation.loads.contacts, simulation.clock.time(), &particles);
-            self.add(1, OBSTACLES, &outlines, &of_obstacles)?;
+            self.add(1, &outlines)?;
         }
-        if self.touches {
-            self.add(2, CONTACTS, &surfaces::snapshot(simulation, &particles), &of_surfaces)?;
+        if simulation.loads.contacts.exist() {
+            self.add(2, &surfaces::snapshot(simulation, &particles))?;
         }
         if let Some(bodies) = &self.bodies {
-            self.add(3, BODIES, &bodies.at(&simulation.particles, &particles), &of_bodies)?;
+            self.add(3, &bodies.at(&simulation.particles, &particles))?;
         }
-        self.add(0, SERIES, &particles, &file)?;
+        self.add(0, &particles)?;
         self.mark.written += 1;
         self.mark.last = Some(step);
         Ok(())
     }
 
-    /// Writes a file, and its entry in a series.
-    fn add(&mut self, which: usize, series: &str, snapshot: &Snapshot, file: &str) -> Result<(), OutputError> {
-        snapshot.write(&self.directory.join(file))?;
-        self.entries[which] += &pvd::entry(snapshot.time, file);
-        pvd::write(&self.directory.join(series), &self.entries[which])
+    /// Writes the next file of a series, given by its number in [`SERIES`], and the entry of this file.
+    fn add(&mut self, series: usize, snapshot: &Snapshot) -> Result<(), OutputError> {
+        let file = name(SERIES[series], self.mark.written);
+        snapshot.write(&self.directory.join(&file))?;
+        self.entries[series] += &pvd::entry(snapshot.time, &file);
+        pvd::write(&pvd::file(&self.directory, SERIES[series]), &self.entries[series])
     }
 }
 

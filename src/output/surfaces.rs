@@ -1,6 +1,7 @@
 //! Pressure, traction and gap at every point of the surfaces that may touch, for ParaView: `contacts_*.vtu`.
 
 use super::fields::padded;
+use super::history::AXES;
 use super::vtu::{Array, Snapshot};
 use crate::material::Law;
 use crate::simulation::Simulation;
@@ -25,23 +26,15 @@ pub(super) fn snapshot<const D: usize, L: Law, A>(simulation: &Simulation<D, L, 
         pressure[one.number] += one.pressure;
         gap[one.number] = gap[one.number].min(one.gap);
     }
-    let scalar = |name: &str, values: Vec<f64>, is_index| Array {
-        name: name.to_owned(),
-        components: vec![String::new()],
-        values,
-        is_index,
-    };
     let body = contacts.points.iter().map(|point| f64::from(of.body[point.particle])).collect();
     let area = contacts.points.iter().map(|point| point.area).collect();
+    let components = AXES.map(str::to_owned).to_vec();
     let arrays = vec![
-        scalar("pressure", pressure, false),
-        Array {
-            components: ["x", "y", "z"].map(str::to_owned).to_vec(),
-            ..scalar("traction", traction.concat(), false)
-        },
-        scalar("gap", gap, false),
-        scalar("area", area, false),
-        scalar("body", body, true),
+        Array::scalar("pressure", pressure, false),
+        Array { components, ..Array::scalar("traction", traction.concat(), false) },
+        Array::scalar("gap", gap, false),
+        Array::scalar("area", area, false),
+        Array::scalar("body", body, true),
     ];
     let points = contacts.points.iter().map(|point| padded(&of.position[point.particle])).collect();
     Snapshot { time: particles.time, background: particles.background, points, arrays, corners: 1 }

@@ -5,7 +5,7 @@ use crate::simulation::ContactForces;
 use serde::{Deserialize, Serialize};
 
 /// An obstacle that bodies touched, or a pair of bodies that touched.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Touched {
     /// Name of the obstacle, or both names of the pair.
@@ -47,17 +47,7 @@ pub(crate) fn see<const D: usize>(
         }
         let at = known.unwrap_or(touched.len());
         if known.is_none() {
-            touched.push(Touched {
-                name,
-                since: time,
-                until: time,
-                force: Vec::new(),
-                largest_force: 0.0,
-                largest_at: time,
-                largest_depth: 0.0,
-                work: 0.0,
-                friction_loss: 0.0,
-            });
+            touched.push(Touched { name, since: time, until: time, largest_at: time, ..Touched::default() });
         }
         let one = &mut touched[at];
         if contact.area > 0.0 {

@@ -31,6 +31,11 @@ pub struct Array {
 }
 
 impl Array {
+    /// An array with one number for each point.
+    pub(crate) fn scalar(name: &str, values: Vec<f64>, is_index: bool) -> Self {
+        Self { name: name.to_owned(), components: vec![String::new()], values, is_index }
+    }
+
     /// The names of the components, as in a table.
     pub(crate) fn columns(&self) -> Vec<String> {
         self.components.iter().map(|component| column(&self.name, component)).collect()

@@ -82,7 +82,7 @@ pub fn main() -> ExitCode {
             look.formats.retain(|one| format == "both" || format == *one);
             plot(&directory, movie.as_deref(), &look)
         }
-        Command::Schema => print_schema(),
+        Command::Schema => serde_json::to_string_pretty(&scene::schema()).map_err(Failure::run).and_then(print),
     };
     let (error, code) = match result {
         Ok(()) => return ExitCode::SUCCESS,
@@ -108,8 +108,4 @@ fn plot(directory: &Path, movie: Option<&Path>, look: &Look) -> Result<(), Failu
         error => Failure::run(error),
     })?;
     print(pictures.iter().map(|picture| picture.display().to_string()).collect::<Vec<_>>().join("\n"))
-}
-
-fn print_schema() -> Result<(), Failure> {
-    print(serde_json::to_string_pretty(&scene::schema()).map_err(Failure::run)?)
 }

@@ -9,7 +9,7 @@ use crate::solver::{Convergence, Forcing, NewtonIteration, NewtonSettings};
 use clap::{Args, ValueEnum};
 use std::num::NonZeroU64;
 use std::ops::RangeInclusive;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use tangent_check::convergence::{Solution, TableForm, table};
 
 /// An iteration is limited by its linear solve if the solve left at least this share of the new residual.
@@ -89,30 +89,6 @@ fn picture(text: &str) -> Result<PathBuf, String> {
     }
 }
 
-/// Steps that do not converge as expected.
-#[derive(Debug, thiserror::Error)]
-#[error("{} of {shown} steps do not converge quadratically:\n  {}", slow.len(), slow.join("\n  "))]
-struct Slow {
-    shown: usize,
-    slow: Vec<String>,
-}
-
-/// The scene ends before the first step to be shown.
-#[derive(Debug, thiserror::Error)]
-#[error("the scene ends after {steps} steps, before step {first}: give an earlier step with --steps")]
-struct EndsBefore {
-    steps: u64,
-    first: u64,
-}
-
-/// The picture cannot be written.
-#[derive(Debug, thiserror::Error)]
-#[error("cannot write {}", path.display())]
-struct Unwritable {
-    path: PathBuf,
-    source: std::io::Error,
-}
-
 impl Newton {
     /// Takes the steps and prints their residuals.
     pub(crate) fn execute(&self) -> Result<(), Failure> {
@@ -132,8 +108,10 @@ impl Newton {
             (newton.relative_tolerance, newton.forcing) = (0.0, Forcing::Fixed(TIGHT));
         }
         let of_scene = simulation.clock.whole_steps(scene.time.end);
-        if of_scene < *self.steps.start() {
-            return Err(Failure::scene(EndsBefore { steps: of_scene, first: *self.steps.start() }));
+        let first = *self.steps.start();
+        if of_scene < first {
+            let what = format!("the scene ends after {of_scene} steps, before step {first}");
+            return Err(Failure::scene(format!("{what}: give an earlier step with --steps")));
         }
         let (mut solutions, mut slow) = (Vec::new(), Vec::new());
         for step in 1..=of_scene.min(*self.steps.end()) {
@@ -155,10 +133,12 @@ impl Newton {
             }
         }
         self.tell(&solutions)?;
-        match self.expect {
-            Some(Expected::Quadratic) if !slow.is_empty() => Err(Failure::run(Slow { shown: solutions.len(), slow })),
-            _ => Ok(()),
+        if self.expect.is_some() && !slow.is_empty() {
+            let (count, shown) = (slow.len(), solutions.len());
+            let what = format!("{count} of {shown} steps do not converge quadratically");
+            return Err(Failure::run(format!("{what}:\n  {}", slow.join("\n  "))));
         }
+        Ok(())
     }
 
     /// Prints the table, and draws the picture.
@@ -171,12 +151,8 @@ impl Newton {
             true => plot::png::from_svg("the norms", &svg).map_err(Failure::run)?,
             false => svg.into_bytes(),
         };
-        write(path, &content)
+        std::fs::write(path, content).map_err(Failure::system(format_args!("write {}", path.display())))
     }
-}
-
-fn write(path: &Path, content: &[u8]) -> Result<(), Failure> {
-    std::fs::write(path, content).map_err(|source| Failure::run(Unwritable { path: path.to_owned(), source }))
 }
 
 /// The residuals of a step.

@@ -275,7 +275,7 @@ impl Along {
             return;
         }
         for (k, component) in self.direction.iter().enumerate() {
-            component.map(|x| problems.number(&format!("{path}[{k}]"), x));
+            problems.number(&format!("{path}[{k}]"), *component);
         }
         let some = self.direction.iter().any(Option::is_some);
         problems.require(some, &path, "a direction without numbers", "must prescribe at least one component");
@@ -293,9 +293,7 @@ fn check_rows(rows: &[Row], problems: &mut Problems, path: &str, dimension: usiz
         }
         for (k, component) in row.iter().enumerate() {
             let path = format!("{path}[{i}][1][{k}]");
-            if let Some(x) = component {
-                problems.number(&path, *x);
-            }
+            problems.number(&path, *component);
             let as_first = first.get(k).is_none_or(|start| start.is_some() == component.is_some());
             let found = component.map_or("null".to_owned(), |x| Number(x).to_string());
             problems.require(as_first, &path, found, "a component must be null in every row or in none");

@@ -1,7 +1,7 @@
 //! Contact between bodies, and checks of all contacts.
 
 use super::Scene;
-use super::obstacle::{check_law, too_stiff};
+use super::obstacle::check_law;
 use super::time::word;
 use crate::mechanics::schemes::Parameters;
 use crate::problems::Problems;
@@ -45,11 +45,6 @@ impl Contact {
         let apart = self.fields(names).iter().any(|field| *field > 0);
         let allowed = "must leave two groups that can touch: add a body, split the group, or remove the key";
         problems.require(apart, "contact", "one group of bodies", allowed);
-    }
-
-    /// A warning about a stiffness that gains nothing.
-    pub(super) fn warning(&self) -> Option<String> {
-        too_stiff("contact", self.stiffness)
     }
 
     /// The nodal field of each body, from 0 in the order of the bodies.
@@ -113,12 +108,8 @@ impl Scene {
             contact.check(problems, &self.body_names(), dimension);
             let mean = "time.scheme is \"energy_momentum\", which would not keep the energy where two deformable bodies meet: take \"newmark\", or \
                         let the bodies meet obstacles only";
-            problems.require(
-                self.time.scheme() != Parameters::EnergyMomentum,
-                "contact",
-                "contact between bodies",
-                mean,
-            );
+            let keeps_energy = self.time.scheme() == Parameters::EnergyMomentum;
+            problems.require(!keeps_energy, "contact", "contact between bodies", mean);
         }
     }
 }

@@ -54,11 +54,9 @@ impl<const D: usize> Builder<'_, D> {
         if let Some(contact) = &scene.contact {
             let fields = scene.nodal_fields();
             let count = fields.iter().max().map_or(1, |last| u64::from(last + 1));
-            if count * stride(self.grid.cells[D - 1]) > u64::from(u32::MAX) {
-                let what = format!(
-                    "{count} groups of bodies are too many for {} cells along the last axis",
-                    self.grid.cells[D - 1]
-                );
+            let cells = self.grid.cells[D - 1];
+            if count * stride(cells) > u64::from(u32::MAX) {
+                let what = format!("{count} groups of bodies are too many for {cells} cells along the last axis");
                 return Err(BuildError::at("contact", what));
             }
             contacts.between =

@@ -113,8 +113,7 @@ impl Curve {
             Self::Of(OtherCurve::Sine(sine)) => {
                 let path = format!("{path}.sine");
                 problems.positive(&format!("{path}.frequency"), sine.frequency);
-                let others = [("amplitude", sine.amplitude), ("phase", sine.phase), ("mean", sine.mean)];
-                for (key, number) in others.into_iter().filter_map(|(key, number)| Some((key, number?))) {
+                for (key, number) in [("amplitude", sine.amplitude), ("phase", sine.phase), ("mean", sine.mean)] {
                     problems.number(&format!("{path}.{key}"), number);
                 }
             }
@@ -140,20 +139,18 @@ impl Curve {
         }
     }
 
+    fn file(&self) -> Option<&CurveFile> {
+        if let Self::Of(OtherCurve::File(file)) = self { Some(file) } else { None }
+    }
+
     /// Reads the file of the curve, if it has one.
     pub(super) fn read(&self, folder: &Path) -> Result<(), FileError> {
-        match self {
-            Self::Of(OtherCurve::File(file)) => file.read(folder),
-            _ => Ok(()),
-        }
+        self.file().map_or(Ok(()), |file| file.read(folder))
     }
 
     /// The checksum of a file that has been read.
     pub(super) fn checksum(&self) -> Option<u32> {
-        match self {
-            Self::Of(OtherCurve::File(file)) => Some(hash(bytemuck::cast_slice(file.rows.get()?))),
-            _ => None,
-        }
+        Some(hash(bytemuck::cast_slice(self.file()?.rows.get()?)))
     }
 
     /// The curve.

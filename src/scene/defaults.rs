@@ -3,7 +3,7 @@
 use super::body::Body;
 use super::{Scene, accuracy, boundary, transfer};
 use crate::field::Field;
-use crate::material::{Law, PLASTIC_STRAIN};
+use crate::material::{Law, Material, PLASTIC_STRAIN};
 use crate::mechanics::contact::contact_modulus;
 use crate::mechanics::reference::GridReset;
 use crate::mechanics::schemes::{LONG_STEPS, Parameters};
@@ -128,8 +128,13 @@ impl Scene {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn fields(&self) -> Vec<Field> {
-        let has_plastic_flow =
-            self.laws().any(|law| law.internal_variables().iter().any(|one| one.name == PLASTIC_STRAIN));
-        self.output.fields(self.time.scheme().has_inertia(), has_plastic_flow)
+        let has_inertia = self.time.scheme().has_inertia();
+        let flows = |law: Material| law.internal_variables().iter().any(|one| one.name == PLASTIC_STRAIN);
+        self.output.fields.clone().unwrap_or_else(|| {
+            let mut fields = vec![Field::Displacement, Field::Velocity, Field::Stress, Field::Jacobian];
+            fields.retain(|field| has_inertia || !field.needs_inertia());
+            fields.splice(..0, self.laws().any(flows).then_some(Field::PlasticStrain));
+            fields
+        })
     }
 }

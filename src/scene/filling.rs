@@ -36,10 +36,8 @@ impl Display for BodyUse {
     fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
         let Self { name, particles, volume, mass, drawn } = self;
         write!(f, "{name}: {particles} particles, mass {mass:.6e}, volume {volume:.6}")?;
-        match drawn {
-            Some(drawn) => write!(f, "; its shape's is {drawn:.6}, {:+.2} %", 100.0 * (volume / drawn - 1.0)),
-            None => Ok(()),
-        }
+        let Some(drawn) = drawn else { return Ok(()) };
+        write!(f, "; its shape's is {drawn:.6}, {:+.2} %", 100.0 * (volume / drawn - 1.0))
     }
 }
 
@@ -84,12 +82,6 @@ impl<const D: usize> Builder<'_, D> {
         }
     }
 
-    /// Keeps the outline of body `number` for pictures. Its corners are as far apart as two particles of the default number per cell.
-    fn outline(&mut self, number: usize, shape: &Shape<D>) {
-        let lines = shape.closed_lines(&self.grid, 0.5 * self.grid.spacing).into_iter().flatten();
-        self.particles.outlines.extend(lines.map(|corners| Outline { body: number as u32, corners }));
-    }
-
     /// Appends the particles of body `number`.
     pub(crate) fn fill(&mut self, number: usize, body: &Body) -> Result<(), BuildError> {
         let common = body.velocity.as_ref().map(|v| vector::<D>(v));
@@ -104,7 +96,9 @@ impl<const D: usize> Builder<'_, D> {
                 self.push(seed.position, velocity, seed.volume, body.density * seed.volume, number);
             }
             if filling.rule == Fill::Cut {
-                self.outline(number, &shape);
+                // The outline for pictures. Its corners are as far apart as two particles of the default number per cell.
+                let lines = shape.closed_lines(&self.grid, 0.5 * self.grid.spacing).into_iter().flatten();
+                self.particles.outlines.extend(lines.map(|corners| Outline { body: number as u32, corners }));
             }
         } else if let Some(file) = &body.particles {
             let path = format!("bodies[{number}].particles.file");

@@ -213,9 +213,7 @@ impl Scene {
         for (i, prescribed) in problems.few("prescribed", &self.prescribed).iter().enumerate() {
             prescribed.check(&mut problems, &format!("prescribed[{i}]"), dimension);
         }
-        if let Some(ghost) = self.ghost_stiffness {
-            problems.between("ghost_stiffness", ghost, 0.0, 1.0);
-        }
+        problems.between("ghost_stiffness", self.ghost_stiffness, 0.0, 1.0);
         self.check_loads(&mut problems, dimension);
         if let Some(initial) = &self.initial_velocity {
             self.check_initial_velocity(initial, &mut problems, dimension);

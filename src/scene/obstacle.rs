@@ -44,9 +44,7 @@ pub(super) fn check_law(problems: &mut Problems, path: &str, friction: f64, stif
     problems.between(&format!("{path}.friction"), friction, 0.0, 100.0);
     let allowed = "must be 0: in one dimension nothing slides";
     problems.require(dimension > 1 || friction == 0.0, &format!("{path}.friction"), friction, allowed);
-    if let Some(stiffness) = stiffness {
-        problems.positive(&format!("{path}.stiffness"), stiffness);
-    }
+    problems.positive(&format!("{path}.stiffness"), stiffness);
 }
 
 /// A warning about a stiffness that gains nothing.

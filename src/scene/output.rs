@@ -61,16 +61,6 @@ pub enum At {
 }
 
 impl Output {
-    /// The fields of a snapshot. The default depends on inertia and plastic flow.
-    pub(super) fn fields(&self, has_inertia: bool, has_plastic_flow: bool) -> Vec<Field> {
-        self.fields.clone().unwrap_or_else(|| {
-            let mut fields = vec![Field::Displacement, Field::Velocity, Field::Stress, Field::Jacobian];
-            fields.retain(|field| has_inertia || !field.needs_inertia());
-            fields.splice(..0, has_plastic_flow.then_some(Field::PlasticStrain));
-            fields
-        })
-    }
-
     /// The fields of snapshots and probes, with their keys.
     pub(super) fn asked(&self) -> Vec<(String, &Field)> {
         let fields = self.fields.iter().flatten().enumerate().map(|(i, field)| (format!("output.fields[{i}]"), field));
@@ -79,11 +69,8 @@ impl Output {
     }
 
     pub(super) fn check(&self, problems: &mut Problems, bodies: &[Body], grid: &GridBox) {
-        for (path, interval) in [("output.every", self.every), ("output.checkpoint", self.checkpoint)] {
-            if let Some(interval) = interval {
-                problems.positive(path, interval);
-            }
-        }
+        problems.positive("output.every", self.every);
+        problems.positive("output.checkpoint", self.checkpoint);
         let fields = self.fields.as_deref().unwrap_or_default();
         for (i, field) in problems.few("output.fields", fields).iter().enumerate() {
             let again = fields.iter().take(i).any(|earlier| earlier.name() == field.name());

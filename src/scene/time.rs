@@ -146,7 +146,7 @@ impl Time {
         let beta_ok = beta >= lowest * (1.0 - 1e-12) && beta <= 2.0;
         let allowed = format!("must lie between gamma/2 = {lowest} and 2 (stability: 2 beta >= gamma >= 0.5)");
         problems.require(beta_ok, "time.beta", Number(beta), allowed);
-        problems.between("time.lumping", self.lumping.unwrap_or(1.0), 0.0, 1.0);
+        problems.between("time.lumping", self.lumping, 0.0, 1.0);
         if let Some(Adaptive { tolerance }) = self.adaptive {
             let small = !problems.positive("time.adaptive.tolerance", tolerance) || tolerance <= 1.0;
             problems.require(small, "time.adaptive.tolerance", Number(tolerance), "must be at most 1");

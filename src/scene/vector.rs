@@ -9,9 +9,7 @@ pub(super) fn check_normal(problems: &mut Problems, path: &str, normal: &[f64], 
         return false;
     }
     let largest = normal.iter().fold(0.0, |largest: f64, x| largest.max(x.abs()));
-    let ok = largest >= 1e-100;
-    problems.require(ok, path, "the zero vector", "must have a direction");
-    ok
+    problems.require(largest >= 1e-100, path, "the zero vector", "must have a direction")
 }
 
 /// Checks the axis of a rotation: needed in 3D, and not allowed in 2D.

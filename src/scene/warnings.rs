@@ -1,5 +1,6 @@
 //! Warnings, with numbers, about scenes that run but may be wrong. `bfree check` and the start of a run print these warnings.
 
+use super::obstacle::too_stiff;
 use super::shape::Shape as Drawn;
 use super::time::word;
 use super::{BodyUse, Scene};
@@ -83,7 +84,7 @@ impl Scene {
         all.extend(without_nodes(grid, "prescribed", prescribed));
         let initial = self.initial_velocity.iter().flat_map(|initial| &initial.nodes);
         all.extend(without_nodes(grid, "initial_velocity.nodes", initial.filter_map(|node| node.region.build())));
-        all.extend(self.contact.as_ref().and_then(super::contact::Contact::warning));
+        all.extend(self.contact.as_ref().and_then(|contact| too_stiff("contact", contact.stiffness)));
         let moving = simulation.loads.contacts.obstacles.iter().map(Obstacle::moves);
         all.extend(self.obstacles.iter().zip(moving).enumerate().filter_map(|(i, (obstacle, moves))| {
             let shape = obstacle.shape.build()?;

@@ -28,7 +28,7 @@ pub use convergence::newton_norms;
 pub use view::View;
 
 use super::files::write_atomically;
-use super::snapshots::{bodies_beside, obstacles_beside};
+use super::snapshots::beside;
 use super::vtu::Snapshot;
 use super::{OutputError, pvd};
 use axes::extremes;
@@ -174,8 +174,8 @@ fn at_time(directory: &Path, snapshots: &[PathBuf], time: Option<f64>) -> Result
 
 /// The obstacles and the outlines of bodies beside a snapshot of particles, if there are any.
 fn surfaces(particles: &Path) -> Result<Surfaces, OutputError> {
-    let read = |path: Option<PathBuf>| path.map(|path| Snapshot::read(&path)).transpose();
-    Ok(Surfaces { obstacles: read(obstacles_beside(particles))?, bodies: read(bodies_beside(particles))? })
+    let read = |series| beside(particles, series).map(|path| Snapshot::read(&path)).transpose();
+    Ok(Surfaces { obstacles: read("obstacles")?, bodies: read("bodies")? })
 }
 
 /// The settings that all pictures of the particles of a run have in common.

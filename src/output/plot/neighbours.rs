@@ -40,6 +40,12 @@ impl<'a> Neighbours<'a> {
         Self { snapshot, mean, cubes }
     }
 
+    /// The position of `p` in the plane.
+    fn plane(&self, p: usize) -> Vector<f64, 2> {
+        let [x, y, _] = self.snapshot.points[p];
+        Vector::from([x, y])
+    }
+
     /// The other particles in the cube of `p` and in `layers` layers of cubes around it.
     fn around(&self, p: usize, layers: i64) -> impl Iterator<Item = usize> + '_ {
         let [i, j, k] = cube(self.snapshot, &self.snapshot.points[p], 2.0 * self.mean);
@@ -74,12 +80,10 @@ impl<'a> Neighbours<'a> {
     /// Voronoi cell of `p` in the plane, a polygon. At the surface of a body, a neighbour may lack a counterpart on the other side. The
     /// cell then ends as far out as it does inwards.
     pub(super) fn cell(&self, p: usize) -> Vec<Vector<f64, 2>> {
-        let points = &self.snapshot.points;
-        let plane = |p: usize| Vector::from([points[p][0], points[p][1]]);
-        let centre = plane(p);
+        let centre = self.plane(p);
         let distance = self.distance(p);
         let reach = self.mean.max(distance);
-        let around: Vec<Vector<f64, 2>> = self.around(p, 1).map(|q| plane(q) - centre).collect();
+        let around: Vec<Vector<f64, 2>> = self.around(p, 1).map(|q| self.plane(q) - centre).collect();
         // Bisectors with the neighbours, and with mirrored neighbours where none lies within 60° of the opposite direction.
         let mut towards: Vec<_> = around.iter().copied().filter(|v| v.norm() < 2.0 * reach).collect();
         let missing = |v: &Vector<f64, 2>| around.iter().all(|other| other.dot(v) <= 0.5 * other.norm() * v.norm());
@@ -93,10 +97,8 @@ impl<'a> Neighbours<'a> {
     /// Voronoi cell of `p` in the plane, a polygon. At the surface of a body the cell reaches beyond the body, so that an outline can cut
     /// it.
     pub(super) fn wide_cell(&self, p: usize) -> Vec<Vector<f64, 2>> {
-        let points = &self.snapshot.points;
-        let plane = |p: usize| Vector::from([points[p][0], points[p][1]]);
-        let centre = plane(p);
-        let towards = self.around(p, LAYERS).map(|q| plane(q) - centre).filter(|v| v.norm() > 0.0);
+        let centre = self.plane(p);
+        let towards = self.around(p, LAYERS).map(|q| self.plane(q) - centre).filter(|v| v.norm() > 0.0);
         bisected(centre, LAYERS as f64 * self.mean, towards)
     }
 }

@@ -6,7 +6,7 @@ use super::neighbours::Neighbours;
 use super::palette::VIRIDIS;
 use crate::output::OutputError;
 use crate::output::history::AXES;
-use crate::output::snapshots::{bodies_beside, obstacles_beside};
+use crate::output::snapshots::beside;
 use crate::output::vtu::{Array, Background, Snapshot};
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
@@ -108,9 +108,9 @@ impl Recording {
             return Err(OutputError::content(path, "has other particles or fields than the first snapshot of the run"));
         }
         self.times.push(snapshot.time);
-        let obstacles = self.segments(obstacles_beside(path))?;
+        let obstacles = self.segments(beside(path, "obstacles"))?;
         add_changed(&mut self.outlines, obstacles);
-        let bodies = self.segments(bodies_beside(path))?;
+        let bodies = self.segments(beside(path, "bodies"))?;
         add_changed(&mut self.bodies, bodies);
         for axis in 0..3 {
             let (low, high) = extremes(snapshot.points.iter().map(|point| point[axis]));
