@@ -102,7 +102,7 @@ impl Problems {
     /// assert!(!problems.is_empty() && problems.to_string().contains("time.beta"), "{problems}");
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub(crate) fn is_empty(&self) -> bool {
+    pub fn is_empty(&self) -> bool {
         self.list.is_empty()
     }
 

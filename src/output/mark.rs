@@ -61,7 +61,7 @@ impl Mark {
     ///
     /// # Errors
     /// A file is missing, shorter, or has other content.
-    pub(crate) fn check(&self, directory: &Path) -> Result<(), OutputError> {
+    pub fn check(&self, directory: &Path) -> Result<(), OutputError> {
         self.files.iter().try_for_each(|(name, written)| written.check(&directory.join(name)))?;
         self.snapshots.map_or(Ok(()), |snapshots| snapshots.check(directory))
     }
