@@ -307,7 +307,7 @@ fn places<const D: usize>(
         let stretch = area.norm();
         let half = match D {
             1 => f64::INFINITY,
-            _ => 0.5 * (stretch * point.area).powf(1.0 / (D - 1) as f64),
+            _ => 0.5 * (stretch * point.halved_area()).powf(1.0 / (D - 1) as f64),
         };
         let back = (identity::<f64, D>() + particles.reference().displacement_gradient[p]) * inverse(&f);
         Place { number, body: particles.body[p], ends: ends(number), normal: area / stretch, half, back }

@@ -143,7 +143,6 @@ impl<const D: usize> Contacts<D> {
     pub(crate) fn halve(&mut self, number: usize, axis: usize, particle: usize) {
         let point = &mut self.points[number];
         point.halved[axis] = point.halved[axis].saturating_add(1);
-        point.area *= 0.5;
         let half = SurfacePoint { particle, ..*point };
         self.points.push(half);
         self.added.push(Added::Half { number, axis });

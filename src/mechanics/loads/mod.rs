@@ -51,7 +51,7 @@ pub struct SurfacePoint<const D: usize> {
     pub particle: usize,
     /// Outward normal N in the reference configuration, the mean of unit normals over A.
     pub normal: Vector<f64, D>,
-    /// Reference area A of the piece. Both halves of a piece that has stretched share its area.
+    /// Reference area A of the piece. A piece that has stretched keeps its area when it is halved.
     pub area: f64,
     /// How often the piece was halved since the start, along each of its edges.
     pub halved: [u8; 2],
@@ -63,10 +63,14 @@ impl<const D: usize> SurfacePoint<D> {
         Self { particle, normal, area, halved: [0; 2] }
     }
 
-    /// The D − 1 edges of the piece in the reference configuration: a square that was halved along its edges, and now has the area A.
+    /// The reference area of the halved piece.
+    pub(crate) fn halved_area(&self) -> f64 {
+        self.area * 0.5_f64.powi(i32::from(self.halved[0]) + i32::from(self.halved[1]))
+    }
+
+    /// The D − 1 edges of the piece in the reference configuration: a square of the area A that was halved along its edges.
     pub(crate) fn edges(&self) -> Vec<Vector<f64, D>> {
-        let square = self.area * 2.0_f64.powi(i32::from(self.halved[0]) + i32::from(self.halved[1]));
-        let edge = square.powf(1.0 / (D.max(2) - 1) as f64);
+        let edge = self.area.powf(1.0 / (D.max(2) - 1) as f64);
         let normal = self.normal.try_normalize(0.0).unwrap_or(self.normal);
         let mut edges: Vec<Vector<f64, D>> = Vec::new();
         // The axes that are nearest to the plane give the directions, so that a turned scene has turned edges.
