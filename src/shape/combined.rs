@@ -32,39 +32,54 @@ fn first_part<'a, const D: usize>(parts: &'a [Shape<D>], x: &Vector<f64, D>, sig
     parts.iter().reduce(|a, b| if distance(b) < distance(a) { b } else { a })
 }
 
-/// The geometry of a union or an intersection: d is the least or the largest of the parts' distances. Given are the sign that makes it the
-/// least, the comparison, d without parts, and the extreme of the parts' reaches.
-macro_rules! extreme_of_parts {
-    ($combination:ident, $sign:literal, $nearer:tt, $without_parts:expr, $reach:path) => {
-        impl<const D: usize> Solid<D> for $combination<D> {
-            fn nearest(&self, x: &Vector<f64, D>) -> Face<D> {
-                let nearer = |a: Face<D>, b: Face<D>| if b.0 $nearer a.0 { b } else { a };
-                self.0.iter().map(|part| part.solid().nearest(x)).fold(($without_parts, axis(0, 1.0)), nearer)
-            }
+impl<const D: usize> Solid<D> for Union<D> {
+    /// d = min dᵢ
+    fn nearest(&self, x: &Vector<f64, D>) -> Face<D> {
+        let nowhere = (f64::INFINITY, axis(0, 1.0));
+        self.0.iter().map(|part| part.solid().nearest(x)).fold(nowhere, |a, b| if b.0 < a.0 { b } else { a })
+    }
 
-            fn feature(&self, x: &Vector<f64, D>) -> Feature<D> {
-                let part = first_part(&self.0, x, $sign);
-                part.map_or_else(|| Feature::plane(x, self.nearest(x)), |part| part.feature(x))
-            }
+    fn feature(&self, x: &Vector<f64, D>) -> Feature<D> {
+        first_part(&self.0, x, 1.0).map_or_else(|| Feature::plane(x, self.nearest(x)), |part| part.feature(x))
+    }
 
-            fn add_planes(&self, x: &Vector<f64, D>, radius: f64, planes: &mut Vec<Face<D>>) -> f64 {
-                self.0.iter().map(|part| part.solid().add_planes(x, radius, planes)).fold(0.0, f64::max)
-            }
+    fn add_planes(&self, x: &Vector<f64, D>, radius: f64, planes: &mut Vec<Face<D>>) -> f64 {
+        self.0.iter().map(|part| part.solid().add_planes(x, radius, planes)).fold(0.0, f64::max)
+    }
 
-            /// An upper bound for an intersection.
-            fn reach(&self, n: &Vector<f64, D>) -> f64 {
-                self.0.iter().map(|part| part.solid().reach(n)).fold(-$without_parts, $reach)
-            }
+    fn reach(&self, n: &Vector<f64, D>) -> f64 {
+        self.0.iter().map(|part| part.solid().reach(n)).fold(f64::NEG_INFINITY, f64::max)
+    }
 
-            fn alone(&self, x: &Vector<f64, D>, radius: f64) -> Option<(&Shape<D>, bool)> {
-                Some((only(&self.0, x, radius, $sign)?, false))
-            }
-        }
-    };
+    fn alone(&self, x: &Vector<f64, D>, radius: f64) -> Option<(&Shape<D>, bool)> {
+        Some((only(&self.0, x, radius, 1.0)?, false))
+    }
 }
 
-extreme_of_parts!(Union, 1.0, <, f64::INFINITY, f64::max);
-extreme_of_parts!(Intersection, -1.0, >, f64::NEG_INFINITY, f64::min);
+impl<const D: usize> Solid<D> for Intersection<D> {
+    /// d = max dᵢ
+    fn nearest(&self, x: &Vector<f64, D>) -> Face<D> {
+        let everywhere = (f64::NEG_INFINITY, axis(0, 1.0));
+        self.0.iter().map(|part| part.solid().nearest(x)).fold(everywhere, |a, b| if b.0 > a.0 { b } else { a })
+    }
+
+    fn feature(&self, x: &Vector<f64, D>) -> Feature<D> {
+        first_part(&self.0, x, -1.0).map_or_else(|| Feature::plane(x, self.nearest(x)), |part| part.feature(x))
+    }
+
+    fn add_planes(&self, x: &Vector<f64, D>, radius: f64, planes: &mut Vec<Face<D>>) -> f64 {
+        self.0.iter().map(|part| part.solid().add_planes(x, radius, planes)).fold(0.0, f64::max)
+    }
+
+    /// An upper bound.
+    fn reach(&self, n: &Vector<f64, D>) -> f64 {
+        self.0.iter().map(|part| part.solid().reach(n)).fold(f64::INFINITY, f64::min)
+    }
+
+    fn alone(&self, x: &Vector<f64, D>, radius: f64) -> Option<(&Shape<D>, bool)> {
+        Some((only(&self.0, x, radius, -1.0)?, false))
+    }
+}
 
 impl<const D: usize> Solid<D> for Difference<D> {
     /// d = max(d_of, −d_minus)
