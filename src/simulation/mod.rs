@@ -16,8 +16,7 @@ mod step;
 mod touching;
 mod work;
 
-pub use crate::mechanics::loads::PrescribedDof;
-use crate::mechanics::loads::Reaction;
+pub use crate::mechanics::loads::Reaction;
 pub(crate) use compiled::as_type;
 pub use history::History;
 pub use next_step::NextStep;
@@ -29,7 +28,7 @@ use crate::approximation::{Approximation, ShapeFunction};
 use crate::clock::Clock;
 use crate::grid::Grid;
 use crate::material::{DISSIPATED, Law, Material, internal_variable};
-use crate::mechanics::loads::Loads;
+use crate::mechanics::loads::{Loads, PrescribedDof};
 use crate::mechanics::path::Path;
 use crate::mechanics::schemes::Alphas;
 use crate::mechanics::sweep::{Fields, Points, Supports};

@@ -1,6 +1,6 @@
 //! A block of cells: its groups of particles, their shape-function values along each axis (weights), and its box of nodes.
 
-use super::kernel::Window;
+use super::group::{Group, Window};
 use crate::lanes::LANES;
 use crate::tensor::Vector;
 
@@ -40,15 +40,6 @@ pub(super) struct Span {
     pub(super) width: [u8; 3],
     /// Number of particles.
     pub(super) lanes: u8,
-}
-
-/// The particles of a group, by their index in memory, and the group's number over all blocks.
-#[derive(Clone, Copy, Debug)]
-pub struct Group<'a> {
-    /// From 0.
-    pub number: usize,
-    /// Up to eight particles, one a lane.
-    pub particles: &'a [u32],
 }
 
 impl Block {

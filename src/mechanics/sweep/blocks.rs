@@ -1,6 +1,7 @@
 //! The nodal diagonal blocks of a quadratic form, B(∇N_I, ∇N_I) + m N_I² I, summed over one group of particles.
 
-use super::kernel::{Pairs, Window, each_tile, tile};
+use super::group::Window;
+use super::kernel::{Pairs, each_tile, tile};
 use crate::lanes::{In, LANES, Lane, Lanes, WithLanes, in_dimension};
 use crate::tensor::{Tensor, Vector};
 

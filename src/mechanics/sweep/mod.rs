@@ -24,7 +24,7 @@
 //!   Blocks do not depend on the number of threads, and their buffers are added in the order of the blocks.
 //!   So the result has the same bits for any number of threads.
 //!
-//! Threads are used here and in the vectors of the solver.
+//! Threads are used here and in the vectors of the space.
 
 mod at_particle;
 mod block;
@@ -32,6 +32,7 @@ mod blocks;
 mod builder;
 mod columns;
 mod fields;
+mod group;
 mod kernel;
 mod lattice;
 mod mode;
@@ -46,11 +47,10 @@ mod supports;
 mod tiled;
 
 pub use at_particle::AtParticle;
-pub use block::Group;
 pub use blocks::Quadratic;
 pub(crate) use blocks::pair;
 pub use fields::Fields;
-pub use kernel::At;
+pub use group::{At, Group};
 pub(crate) use lattice::stride;
 pub use mode::{Mode, Weights};
 pub use number::Number;

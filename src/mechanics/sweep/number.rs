@@ -1,7 +1,7 @@
 //! The number types of nodal fields. Gather and scatter are linear, so a dual number is two fields of plain numbers.
 
 use super::at_particle::AtParticle;
-use super::kernel::At;
+use super::group::At;
 use crate::scalar::Real;
 use crate::tensor::Vector;
 use num_dual::Dual64;

@@ -23,8 +23,8 @@ fn parts<const D: usize>(grid: &Grid<D>, block: &Block) -> impl Iterator<Item = 
     let high: [usize; 3] = std::array::from_fn(|k| low[k] + block.size[k]);
     let bricks = move |k: usize| low[k] / edge..high[k].div_ceil(edge);
     let within = move |k: usize, brick: usize| low[k].max(brick * edge)..high[k].min((brick + 1) * edge);
-    let rows = move |[tx, ty, tz]: [usize; 3]| {
-        within(2, tz).flat_map(move |z| within(1, ty).map(move |y| (within(0, tx), y, z)))
+    let rows = move |[bx, by, bz]: [usize; 3]| {
+        within(2, bz).flat_map(move |z| within(1, by).map(move |y| (within(0, bx), y, z)))
     };
     let part = move |(x, y, z): (Range<usize>, usize, usize)| {
         let row = (z - low[2]) * block.size[1] + y - low[1];

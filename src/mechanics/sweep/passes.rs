@@ -1,6 +1,6 @@
 //! The passes over all particles: the particle-to-grid and grid-to-particle transfers that the rest of the program calls.
 
-use super::kernel::At;
+use super::group::At;
 use super::supports::{Implementation, dispatch};
 use super::{AtParticle, Group, Mode, Number, Quadratic, Supports, Weights};
 use crate::lanes::LANES;

@@ -1,9 +1,8 @@
 //! The plain loop over the particles, with one list of (node, N, ∇N) for each particle. It is the specification, and serves shape
 //! functions that are not products.
 
-use super::block::Group;
 use super::blocks::Quadratic;
-use super::kernel::At;
+use super::group::{At, Group};
 use super::points::{Points, SupportError};
 use super::{Evaluate, Fill, Mode, Point};
 use crate::approximation::{Scratch, ShapeFunction, Support};

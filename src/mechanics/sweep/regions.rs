@@ -4,9 +4,10 @@
 //! of its blocks, in the order of the blocks. So no sum depends on the number of threads. A gather is one region: each block writes the
 //! results of its own groups.
 
-use super::block::{Block, Group};
+use super::block::Block;
 use super::blocks::{Quadratic, ScatterBlocks, scatter_blocks};
-use super::kernel::{self, At, Gather, Scatter, Window};
+use super::group::{At, Group, Window};
+use super::kernel::{self, Gather, Scatter};
 use super::tiled::{RANGE, Tiled};
 use super::{Evaluate, Fill, Mode, Point};
 use crate::lanes::LANES;

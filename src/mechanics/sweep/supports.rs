@@ -1,7 +1,7 @@
 //! The shape functions of all particles, evaluated once, and their storage for the passes over the particles.
 
-use super::block::Group;
 use super::columns::WIDEST;
+use super::group::Group;
 use super::plain::Plain;
 use super::points::{Points, SupportError};
 use super::tiled::Tiled;

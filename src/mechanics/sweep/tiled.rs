@@ -3,9 +3,10 @@
 //!
 //! Particles are taken in the order (cell, id). [Groups and blocks](super) are defined on the page of the module.
 
-use super::block::{Block, Group};
+use super::block::Block;
 use super::builder::Builder;
 use super::columns::Family;
+use super::group::Group;
 use super::numbering::number;
 use super::order::{self, Key};
 use super::points::{Points, SupportError};
