@@ -224,6 +224,8 @@ fn a_body_does_not_pass_another_one_silently() -> Result<(), Failure> {
 
 /// A plate with a stem is pushed against a thin plate in load steps, at 0.9 to 3 spacings a step, straight and obliquely. The run ends with an
 /// error, or the plates still touch at its end.
+/// Two guards hold here: the search for candidates, and the check of the motion that a step has found. Without both, six of the eight scenes end
+/// without a force and without an error.
 #[test]
 fn a_thin_plate_does_not_pass_another_one_in_load_steps() -> Result<(), Failure> {
     let block = |min: [f64; 2], max: [f64; 2]| json!({ "box": { "min": min, "max": max } });
