@@ -66,13 +66,24 @@ pub fn record<R>(f: impl FnOnce() -> R) -> (R, Vec<Region>) {
     (result, REGIONS.take().unwrap_or_default())
 }
 
-/// Calls `f(part)` for all parts in order, and records the times.
-fn record_region<P>(place: &'static Location<'static>, parts: impl Iterator<Item = P>, mut f: impl FnMut(P)) {
+/// Calls `task(0)`, …, `task(count − 1)`, each on any free thread. This is the only call of the pool, so its code is compiled once.
+fn run(place: &'static Location<'static>, count: usize, task: &(dyn Fn(usize) + Sync)) {
+    if records() {
+        record_region(place, count, task);
+    } else if count > 1 && several() {
+        (0..count).into_par_iter().for_each(task);
+    } else {
+        (0..count).for_each(task);
+    }
+}
+
+/// Calls all tasks in order, and records the times.
+fn record_region(place: &'static Location<'static>, count: usize, task: &(dyn Fn(usize) + Sync)) {
     let before = REGIONS.take();
     let begin = Instant::now();
     let mut last = begin;
-    let tasks = parts.map(|part| {
-        f(part);
+    let tasks = (0..count).map(|number| {
+        task(number);
         let before = std::mem::replace(&mut last, Instant::now());
         (last - before).as_secs_f64()
     });
@@ -140,16 +151,13 @@ pub(crate) fn map<R: Send>(count: usize, f: &(dyn Fn(usize) -> R + Sync)) -> Vec
 /// `f(part)` of every part.
 #[track_caller]
 pub(crate) fn collect<P: Send, R: Send>(parts: impl Iterator<Item = P>, f: &(dyn Fn(P) -> R + Sync)) -> Vec<R> {
-    let parts: Vec<P> = parts.collect();
-    if records() {
-        let mut results = Vec::with_capacity(parts.len());
-        record_region(Location::caller(), parts.into_iter(), |part| results.push(f(part)));
-        results
-    } else if parts.len() > 1 && several() {
-        parts.into_par_iter().map(f).collect()
-    } else {
-        parts.into_iter().map(f).collect()
-    }
+    // A part, and then its result. Each is locked once.
+    let tasks: Vec<_> = parts.map(|part| Mutex::new((Some(part), None))).collect();
+    run(Location::caller(), tasks.len(), &|number| {
+        let mut task = held(&tasks[number]);
+        task.1 = task.0.take().map(f);
+    });
+    tasks.into_iter().filter_map(|task| task.into_inner().unwrap_or_else(PoisonError::into_inner).1).collect()
 }
 
 /// Particles or nodes in one task of a pass over arrays.
