@@ -4,7 +4,7 @@
 //! |---|---|
 //! | [`scene_in_code`] | everything a JSON scene can say, as fields of a [`crate::simulation::Simulation`] |
 //! | [`law_from_energy`] | your own law, from its energy alone |
-//! | [`own_law`] | your own law with its analytic tangent, and the one line that checks it in your CI |
+//! | `examples/own_law` of the repository, a crate of its own | your own law with its analytic tangent, and the one line that checks it in your CI |
 //! | [`own_shape_function`] | your own shape function |
 //! | [`observer`] | the solver driven step by step |
 
@@ -17,7 +17,6 @@ macro_rules! shown {
 shown!(
     scene_in_code: "examples/scene_in_code.rs",
     law_from_energy: "examples/law_from_energy.rs",
-    own_law: "examples/own_law/src/lib.rs",
     own_shape_function: "examples/own_shape_function.rs",
     observer: "examples/observer.rs"
 );

@@ -201,14 +201,15 @@ fn the_manual_gives_the_levels_of_accuracy() -> Result<(), Failure> {
     Ok(())
 }
 
-/// The text above the keys.
+/// The text above the index.
 const ABOUT_SCENES: &str = "\
 # Scenes
 
 <!-- Written from the schema: BFREE_WRITE_SCHEMA=1 cargo test --release --test suite schema -->
 
-A scene is one JSON file. This page lists every key. It is generated from the schema, `schemas/scene.schema.json`, which `bfree schema`
-prints too; `bfree new` writes it beside a scene, so that editors complete and explain the keys.
+A scene is one JSON file. This page lists every key, by topic. [The scene](#the-scene) has the keys of the file itself, and links to what they
+take. The page is generated from the schema, `schemas/scene.schema.json`, which `bfree schema` prints too; `bfree new` writes it beside a
+scene, so that editors complete and explain the keys.
 
 Units are your own consistent set, such as m, kg, s or mm, t, s. Lists of numbers have one entry per dimension of the grid. Where
 `accuracy` is given, `grid.spacing` and `time.step` may be left out.
@@ -217,15 +218,48 @@ Units are your own consistent set, such as m, kg, s or mm, t, s. Lists of number
 `--set grid.spacing=0.25`, `--set bodies.0.density=2`.
 ";
 
-/// The page: the scene, then every type in the order of first mention.
+/// The topics of the page, each with the types that it begins with. Types that these mention follow them, unless an earlier topic has them.
+const TOPICS: [(&str, &[&str]); 9] = [
+    ("The grid and its functions", &["GridBox", "Approximation", "Accuracy"]),
+    ("Bodies", &["Body"]),
+    ("Shapes", &["Shape"]),
+    ("Laws", &["Material"]),
+    (
+        "Motions and loads",
+        &["Boundary", "Prescribed", "InitialVelocity", "Gravity", "Traction", "Pressure", "Rayleigh"],
+    ),
+    ("Obstacles and contact between bodies", &["Obstacle", "Contact"]),
+    ("Time and the transfer to particles", &["Time", "Transfer"]),
+    ("The solver", &["Solver"]),
+    ("Results", &["Output"]),
+];
+
+/// The page: an index, the scene, then every type, by topic.
 fn keys() -> String {
     let schema = scene::schema().to_value();
-    let mut writer = Writer { text: ABOUT_SCENES.to_owned(), met: BTreeSet::new(), next: VecDeque::new() };
-    writer.section("The scene", &schema);
-    while let Some(name) = writer.next.pop_front() {
-        writer.section(&name, &schema["$defs"][&name]);
+    let met = TOPICS.iter().flat_map(|(_, types)| *types).map(|&name| name.to_owned()).collect();
+    let mut writer = Writer { text: String::new(), met, next: VecDeque::new() };
+    let mut index = format!("{ABOUT_SCENES}\n| topic | sections |\n|---|---|\n");
+    writer.section("## The scene", &schema);
+    for (topic, types) in TOPICS {
+        // Writing to a string cannot fail.
+        let _ = write!(writer.text, "\n## {topic}\n");
+        writer.next.extend(types.iter().map(|&name| name.to_owned()));
+        let mut sections = Vec::new();
+        while let Some(name) = writer.next.pop_front() {
+            let schema = &schema["$defs"][&name];
+            assert!(schema.is_object(), "the schema has no type {name}: correct the topic {topic}");
+            writer.section(&format!("### {name}"), schema);
+            sections.push(link(&name));
+        }
+        let _ = writeln!(index, "| {} | {} |", link(topic), sections.join(", "));
     }
-    writer.text
+    index + &writer.text
+}
+
+/// A link to a heading of the page.
+fn link(heading: &str) -> String {
+    format!("[{heading}](#{})", anchor(heading))
 }
 
 struct Writer {
@@ -235,9 +269,8 @@ struct Writer {
 }
 
 impl Writer {
-    fn section(&mut self, name: &str, schema: &Value) {
-        // Writing to a string cannot fail.
-        let _ = write!(self.text, "\n## {name}\n\n{}\n", about(schema));
+    fn section(&mut self, heading: &str, schema: &Value) {
+        let _ = write!(self.text, "\n{heading}\n\n{}\n", about(schema));
         if let Some(variants) = schema["oneOf"].as_array() {
             self.text.push_str("\n| write | where | |\n|---|---|---|\n");
             for variant in variants {
@@ -287,7 +320,7 @@ impl Writer {
             if self.met.insert(name.to_owned()) {
                 self.next.push_back(name.to_owned());
             }
-            return format!("[{name}](#{})", anchor(name));
+            return link(name);
         }
         if let Some(any) = schema["anyOf"].as_array() {
             let kinds: Vec<String> = any.iter().filter(|one| one["type"] != "null").map(|one| self.kind(one)).collect();
