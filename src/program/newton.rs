@@ -146,10 +146,10 @@ impl Newton {
         print(table(solutions, self.form.of_table()).trim_end())?;
         let Some(path) = &self.plot else { return Ok(()) };
         let lines: Vec<_> = solutions.iter().map(|one| (one.name.as_str(), one.norms.as_slice())).collect();
-        let svg = plot::newton_norms("Convergence of Newton's method", &lines);
+        let picture = plot::newton_norms("Convergence of Newton's method", &lines);
         let content = match path.extension().is_some_and(|extension| extension == "png") {
-            true => plot::png::from_svg("the norms", &svg).map_err(Failure::run)?,
-            false => svg.into_bytes(),
+            true => picture.png("the norms").map_err(Failure::run)?,
+            false => picture.svg().into_bytes(),
         };
         std::fs::write(path, content).map_err(Failure::system(format_args!("write {}", path.display())))
     }

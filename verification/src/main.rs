@@ -276,7 +276,7 @@ fn chapter(study: &Study, result: &Result<Outcome, StudyError>, seconds: f64, fo
                 text += &format!("{remark}\n\n");
             }
             for sheet in &outcome.sheets {
-                text += &format!("![{}]({folder}/{}.png)\n\n{}\n\n", sheet.name, sheet.name, sheet.caption);
+                text += &format!("![{}]({folder}/{}.svg)\n\n{}\n\n", sheet.name, sheet.name, sheet.caption);
             }
             for table in &outcome.tables {
                 text += &format!("{}\n", table.markdown());
@@ -290,16 +290,14 @@ fn chapter(study: &Study, result: &Result<Outcome, StudyError>, seconds: f64, fo
     text + &format!("({seconds:.0} s)\n")
 }
 
-/// Writes the pictures, as SVG and PNG.
+/// Writes the pictures.
 fn draw(directory: &Path, outcome: &Outcome) -> Result<(), Failure> {
     fs::create_dir_all(directory).map_err(writing(directory.display().to_string()))?;
     for sheet in &outcome.sheets {
         let place = directory.join(sheet.name);
         let failed = |error| Failure { place: place.display().to_string(), source: error };
         let svg = sheet.svg().map_err(|error| failed(io::Error::other(error.to_string())))?;
-        let png = sheet.png(&svg).map_err(|error| failed(io::Error::other(error)))?;
         fs::write(place.with_extension("svg"), svg).map_err(failed)?;
-        fs::write(place.with_extension("png"), png).map_err(failed)?;
     }
     Ok(())
 }

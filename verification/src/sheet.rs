@@ -1,8 +1,6 @@
 //! Charts side by side in one picture, for print.
 
 use crate::axis::{Axis, range};
-use bfree::output::OutputError;
-use bfree::output::plot::png;
 use plotters::coord::Shift;
 use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint, Ranged};
 use plotters::element::DashedPathElement;
@@ -112,14 +110,6 @@ impl Sheet {
         let (width, height) = self.extent();
         let drawn = format!(r#"width="{}" height="{}" viewBox"#, width * FINE, height * FINE);
         Ok(text.replacen(&drawn, &format!(r#"width="{width}" height="{height}" viewBox"#), 1))
-    }
-
-    /// An SVG of this picture as PNG.
-    ///
-    /// # Errors
-    /// Errors of the rendering library.
-    pub fn png(&self, svg: &str) -> Result<Vec<u8>, OutputError> {
-        png::from_svg(self.name, svg)
     }
 
     fn rows(&self) -> usize {

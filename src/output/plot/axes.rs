@@ -1,7 +1,8 @@
 //! A pair of axes: tick labels, names, and the position of a point in the frame.
 
+use super::font::width;
 use super::palette::{BLACK, GREY, LIGHT};
-use super::svg::{Anchor, Point, Svg, width};
+use super::picture::{Anchor, Picture, Point};
 
 /// Font size of tick labels and axis names.
 pub(super) const LABEL: f64 = 13.0;
@@ -88,31 +89,37 @@ impl Axes {
     }
 
     /// Draws the frame, ticks and names, and grid lines if `lines`. An empty name is left out.
-    pub(super) fn draw(&self, svg: &mut Svg, [level, upright]: [&Ticks; 2], [x, y]: [&str; 2], lines: bool) {
+    pub(super) fn draw(&self, picture: &mut Picture, [level, upright]: [&Ticks; 2], [x, y]: [&str; 2], lines: bool) {
         let ((left, top), (wide, tall)) = (self.corner, self.size);
         let (right, bottom) = (left + wide, top + tall);
         for &at in &level.at {
             let place = self.place((at, self.y.0)).0;
             if lines {
-                svg.line([(place, top), (place, bottom)], LIGHT, 0.8);
+                picture.line([(place, top), (place, bottom)], LIGHT, 0.8);
             }
-            svg.line([(place, bottom), (place, bottom + 5.0)], GREY, 1.0);
-            svg.text((place, bottom + 21.0), Anchor::Middle, LABEL, BLACK, &level.label(at));
+            picture.line([(place, bottom), (place, bottom + 5.0)], GREY, 1.0);
+            picture.text((place, bottom + 21.0), Anchor::Middle, LABEL, BLACK, &level.label(at));
         }
         for &at in &upright.at {
             let place = self.place((self.x.0, at)).1;
             if lines {
-                svg.line([(left, place), (right, place)], LIGHT, 0.8);
+                picture.line([(left, place), (right, place)], LIGHT, 0.8);
             }
-            svg.line([(left - 5.0, place), (left, place)], GREY, 1.0);
-            svg.text((left - 8.0, place + 0.35 * LABEL), Anchor::End, LABEL, BLACK, &upright.label(at));
+            picture.line([(left - 5.0, place), (left, place)], GREY, 1.0);
+            picture.text((left - 8.0, place + 0.35 * LABEL), Anchor::End, LABEL, BLACK, &upright.label(at));
         }
-        svg.line([(left, top), (left, bottom), (right, bottom), (right, top), (left, top)], GREY, 1.0);
+        picture.line([(left, top), (left, bottom), (right, bottom), (right, top), (left, top)], GREY, 1.0);
         if !x.is_empty() {
-            svg.text(((left + right) / 2.0, bottom + TICK_LABELS + 15.0), Anchor::Middle, LABEL, BLACK, &level.name(x));
+            picture.text(
+                ((left + right) / 2.0, bottom + TICK_LABELS + 15.0),
+                Anchor::Middle,
+                LABEL,
+                BLACK,
+                &level.name(x),
+            );
         }
         let beside = left - 16.0 - upright.width();
-        svg.text((beside, (top + bottom) / 2.0), Anchor::Upright, LABEL, BLACK, &upright.name(y));
+        picture.text((beside, (top + bottom) / 2.0), Anchor::Upright, LABEL, BLACK, &upright.name(y));
     }
 }
 

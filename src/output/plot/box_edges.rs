@@ -1,8 +1,9 @@
 //! The edges of the box around the particles in space, and their labels.
 
 use super::axes::{Axes, LABEL, Ticks};
+use super::font::width;
 use super::palette::{BLACK, GREY, LIGHT};
-use super::svg::{Anchor, Point, Svg, width};
+use super::picture::{Anchor, Color, Picture, Point};
 use super::view::Directions;
 use crate::output::history::AXES;
 
@@ -12,7 +13,7 @@ pub(super) fn corner(bounds: [[f64; 3]; 2], number: usize) -> [f64; 3] {
 }
 
 /// Draws the edges of the box behind the particles. Returns labels along one edge of each axis at the outline.
-pub(super) fn draw(svg: &mut Svg, directions: &Directions, bounds: [[f64; 3]; 2], axes: &Axes) -> Vec<Label> {
+pub(super) fn draw(picture: &mut Picture, directions: &Directions, bounds: [[f64; 3]; 2], axes: &Axes) -> Vec<Label> {
     let place = |number: usize| axes.place(directions.project(corner(bounds, number)));
     let depth = |number: usize| directions.depth(corner(bounds, number));
     let nearest = (0..8).max_by(|&a, &b| depth(a).total_cmp(&depth(b)));
@@ -21,7 +22,7 @@ pub(super) fn draw(svg: &mut Svg, directions: &Directions, bounds: [[f64; 3]; 2]
         let starts = || (0..8).filter(|number| number >> axis & 1 == 0);
         let end = |start: usize| start | 1 << axis;
         for start in starts().filter(|&start| Some(start) != nearest && Some(end(start)) != nearest) {
-            svg.line([place(start), place(end(start))], LIGHT, 1.0);
+            picture.line([place(start), place(end(start))], LIGHT, 1.0);
         }
         // The lowest of the edges that run horizontally, the leftmost of the edges that run vertically.
         let run = |start: usize| (place(end(start)).0 - place(start).0, place(end(start)).1 - place(start).1);
@@ -32,7 +33,7 @@ pub(super) fn draw(svg: &mut Svg, directions: &Directions, bounds: [[f64; 3]; 2]
         };
         let Some(start) = starts().max_by(|a, b| outward(a).total_cmp(&outward(b))) else { continue };
         let (from, to) = (place(start), place(end(start)));
-        svg.line([from, to], GREY, 1.0);
+        picture.line([from, to], GREY, 1.0);
         let ends = (bounds[0][axis], bounds[1][axis]);
         let length = (to.0 - from.0).hypot(to.1 - from.1);
         let ticks = Ticks::new(ends, ((length / 45.0) as usize).max(2), false);
@@ -59,7 +60,7 @@ pub(super) struct Label {
     point: Point,
     left: bool,
     far: f64,
-    color: &'static str,
+    color: Color,
     text: String,
 }
 
@@ -79,11 +80,11 @@ impl Label {
     }
 
     /// Draws the text.
-    pub(super) fn draw(&self, svg: &mut Svg) {
+    pub(super) fn draw(&self, picture: &mut Picture) {
         let (x, y) = self.point;
         match self.left {
-            true => svg.text((x - self.far, y + 0.35 * LABEL), Anchor::End, LABEL, self.color, &self.text),
-            false => svg.text((x, y + self.far + 10.0), Anchor::Middle, LABEL, self.color, &self.text),
+            true => picture.text((x - self.far, y + 0.35 * LABEL), Anchor::End, LABEL, self.color, &self.text),
+            false => picture.text((x, y + self.far + 10.0), Anchor::Middle, LABEL, self.color, &self.text),
         }
     }
 }

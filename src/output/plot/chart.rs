@@ -1,8 +1,9 @@
 //! Lines against time, in panels one above the other.
 
 use super::axes::{AXIS_NAME, Axes, LABEL, TICK_LABELS, Ticks, range};
+use super::font::{shortened, width};
 use super::palette::{BLACK, GREY};
-use super::svg::{Anchor, Point, Svg, shortened, width};
+use super::picture::{Anchor, Color, Picture, Point};
 
 /// Width of a figure, in SVG units.
 const WIDTH: f64 = 900.0;
@@ -26,12 +27,12 @@ const SUBTITLE: f64 = 13.0;
 pub(super) struct Line {
     /// Name; empty for a line that is not in the legend.
     pub label: String,
-    pub color: &'static str,
+    pub color: Color,
     pub points: Vec<Point>,
 }
 
 impl Line {
-    pub(super) fn new(label: &str, color: &'static str, points: Vec<Point>) -> Self {
+    pub(super) fn new(label: &str, color: Color, points: Vec<Point>) -> Self {
         Self { label: label.to_owned(), color, points }
     }
 }
@@ -91,19 +92,19 @@ impl Heading {
     pub(super) const HEIGHT: f64 = 56.0;
 
     /// A picture with the heading in its middle.
-    pub(super) fn picture(&self, width: f64, height: f64) -> Svg {
-        let mut svg = Svg::new(width, height);
+    pub(super) fn picture(&self, width: f64, height: f64) -> Picture {
+        let mut picture = Picture::new(width, height);
         let lines = [(&self.what, TITLE, 26.0, BLACK), (&self.run, SUBTITLE, 45.0, GREY)];
         for (text, size, base, color) in lines {
-            svg.text((width / 2.0, base), Anchor::Middle, size, color, &shortened(text, size, width - 20.0));
+            picture.text((width / 2.0, base), Anchor::Middle, size, color, &shortened(text, size, width - 20.0));
         }
-        svg
+        picture
     }
 }
 
-/// The figure as SVG, with the given height in SVG units.
-pub(super) fn draw(heading: &Heading, height: f64, panels: &[Panel]) -> String {
-    let mut svg = heading.picture(WIDTH, height);
+/// The figure, with the given height.
+pub(super) fn draw(heading: &Heading, height: f64, panels: &[Panel]) -> Picture {
+    let mut picture = heading.picture(WIDTH, height);
     let mut top = Heading::HEIGHT;
     let spans = |panel: &Panel| {
         let points = panel.lines.iter().flat_map(|line| &line.points);
@@ -125,7 +126,7 @@ pub(super) fn draw(heading: &Heading, height: f64, panels: &[Panel]) -> String {
     for (number, panel) in panels.iter().enumerate() {
         if !panel.caption.is_empty() {
             let caption = shortened(&panel.caption, LABEL, WIDTH - left - 10.0);
-            svg.text((left, top + 12.0), Anchor::Start, LABEL, GREY, &caption);
+            picture.text((left, top + 12.0), Anchor::Start, LABEL, GREY, &caption);
             top += 20.0;
         }
         let (x, y) = spans(panel);
@@ -135,15 +136,15 @@ pub(super) fn draw(heading: &Heading, height: f64, panels: &[Panel]) -> String {
         let last = number + 1 == panels.len();
         // Beside the name there must be room for a power of ten.
         let upright_name = shortened(&panel.y, LABEL, size.1 - 60.0);
-        axes.draw(&mut svg, [&level, &upright], [if last { panel.x.0 } else { "" }, &upright_name], true);
+        axes.draw(&mut picture, [&level, &upright], [if last { panel.x.0 } else { "" }, &upright_name], true);
         for line in &panel.lines {
             let thickness = if line.label.is_empty() { 0.8 } else { 1.8 };
-            svg.line(thinned(&line.points).into_iter().map(|point| axes.place(point)), line.color, thickness);
+            picture.line(thinned(&line.points).into_iter().map(|point| axes.place(point)), line.color, thickness);
         }
-        legend(&mut svg, &axes, &panel.named());
+        legend(&mut picture, &axes, &panel.named());
         top += size.1 + between;
     }
-    svg.finish()
+    picture
 }
 
 fn name(line: &Line) -> String {
@@ -151,14 +152,14 @@ fn name(line: &Line) -> String {
 }
 
 /// Draws each name at the end of its curve. Names that would overlap are moved apart.
-fn legend(svg: &mut Svg, axes: &Axes, named: &[&Line]) {
+fn legend(picture: &mut Picture, axes: &Axes, named: &[&Line]) {
     let end = |line: &&&Line| thinned(&line.points).last().map_or(axes.corner.1, |point| axes.place(*point).1);
     let mut ends: Vec<(f64, &Line)> = named.iter().map(|line| (end(&line), *line)).collect();
     ends.sort_by(|a, b| a.0.total_cmp(&b.0));
     let heights = apart(ends.iter().map(|(height, _)| *height).collect(), axes.corner.1 + axes.size.1);
     for ((_, line), height) in ends.iter().zip(heights) {
         let at = (axes.corner.0 + axes.size.0 + 8.0, height + 0.35 * LABEL);
-        svg.text(at, Anchor::Start, LABEL, line.color, &name(line));
+        picture.text(at, Anchor::Start, LABEL, line.color, &name(line));
     }
 }
 
@@ -195,7 +196,7 @@ fn thinned(points: &[Point]) -> Vec<Point> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::output::OutputError;
+    use crate::output::plot::picture::Element;
     use crate::output::plot::png::texts;
 
     #[test]
@@ -222,30 +223,31 @@ mod tests {
     #[test]
     fn a_name_cannot_break_the_picture() {
         let panel = Panel::over_time("<script>\"&", vec![line("</text><script>&", 1.0), line("x", 2.0)]);
-        let svg = draw(&Heading { what: "<script>".into(), run: "\u{1}".into() }, 300.0, &[panel]);
+        let svg = draw(&Heading { what: "<script>".into(), run: "\u{1}".into() }, 300.0, &[panel]).svg();
         assert!(!svg.contains("<script>") && svg.contains("&lt;script&gt;") && !svg.contains('\u{1}'), "{svg}");
     }
 
     /// Frames, as left and right ends of their upper sides.
-    fn frames(svg: &str) -> Vec<(f64, f64)> {
-        let corners = svg.split("<polyline points=\"").skip(1).filter_map(|rest| {
-            let points: Vec<&str> = rest.split('"').next()?.split_whitespace().collect();
-            let x = |k: usize| -> Option<f64> { points.get(k)?.split(',').next()?.parse().ok() };
-            (points.len() == 5 && points[0] == points[4]).then_some((x(0)?, x(2)?))
+    fn frames(picture: &Picture) -> Vec<(f64, f64)> {
+        let corners = picture.elements.iter().filter_map(|element| match element {
+            Element::Line { points, .. } if points.len() == 5 && points[0] == points[4] => {
+                Some((points[0].0, points[2].0))
+            }
+            _ => None,
         });
         corners.collect()
     }
 
     #[test]
-    fn panels_have_one_width_and_no_text_is_cut_or_covered() -> Result<(), OutputError> {
+    fn panels_have_one_width_and_no_text_is_cut_or_covered() {
         let long = "W".repeat(60);
         let narrow =
             Panel { caption: long.clone(), share: 0.4, ..Panel::over_time("balance", vec![line("balance", 1e-7)]) };
         let wide = Panel::over_time(&long, vec![line(&long, 3e9), line("total − initial − external work", 3e9)]);
-        let svg = draw(&Heading { what: long.clone(), run: long }, 400.0, &[wide, narrow]);
-        let found = frames(&svg);
+        let picture = draw(&Heading { what: long.clone(), run: long }, 400.0, &[wide, narrow]);
+        let found = frames(&picture);
         assert!(found.len() == 2 && found[0] == found[1], "{found:?}");
-        let (size, texts) = texts(&svg)?;
+        let (size, texts) = (picture.size, texts(&picture));
         assert!(texts.len() > 15, "{}", texts.len());
         for (k, (text, one)) in texts.iter().enumerate() {
             assert!(
@@ -255,6 +257,5 @@ mod tests {
             let covered = texts[..k].iter().find(|(_, other)| one.covers(other));
             assert!(covered.is_none(), "{text} covers {covered:?}");
         }
-        Ok(())
     }
 }

@@ -3,6 +3,7 @@
 use super::axes::rounded;
 use super::chart::{self, Heading, Line, Panel};
 use super::palette;
+use super::picture::{Color, Picture};
 use crate::output::OutputError;
 use crate::output::files::read_if_there;
 use serde::Deserialize;
@@ -27,20 +28,20 @@ fn fall(step: &Step) -> Vec<(f64, f64)> {
     ratio.filter(|point| point.1.is_finite()).collect()
 }
 
-/// The norms of several solutions against the iterations, as SVG.
+/// The norms of several solutions against the iterations, as a picture.
 ///
 /// ```
 /// use bfree::output::plot::newton_norms;
 ///
-/// let svg = newton_norms("Two steps", &[("step 1", &[1.0, 1e-2, 1e-5]), ("step 2", &[0.1, 1e-4])]);
+/// let svg = newton_norms("Two steps", &[("step 1", &[1.0, 1e-2, 1e-5]), ("step 2", &[0.1, 1e-4])]).svg();
 /// assert!(svg.starts_with("<svg") && svg.contains("step 2"));
 /// ```
-pub fn newton_norms(title: &str, solutions: &[(&str, &[f64])]) -> String {
+pub fn newton_norms(title: &str, solutions: &[(&str, &[f64])]) -> Picture {
     use palette::{BLACK, BLUE, GREEN, PURPLE, SKY, VERMILLION};
     let colors = [BLUE, VERMILLION, GREEN, PURPLE, SKY, BLACK].iter().cycle();
-    let line = |((name, norms), color): (&(&str, &[f64]), &&'static str)| {
+    let line = |((name, norms), color): (&(&str, &[f64]), &Color)| {
         let points = norms.iter().enumerate().map(|(k, norm)| (k as f64, norm.log10()));
-        Line::new(name, color, points.filter(|point| point.1.is_finite()).collect())
+        Line::new(name, *color, points.filter(|point| point.1.is_finite()).collect())
     };
     let lines = solutions.iter().zip(colors).map(line).collect();
     let panel = Panel { x: ("Newton iteration", true), ..Panel::over_time("log₁₀ |R|", lines) };

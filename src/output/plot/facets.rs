@@ -2,7 +2,7 @@
 
 use super::axes::{Axes, extremes};
 use super::neighbours::cut;
-use super::svg::Svg;
+use super::picture::Picture;
 use super::view::Directions;
 use crate::output::vtu::Snapshot;
 use crate::tensor::Vector;
@@ -80,12 +80,11 @@ impl<'a> Facets<'a> {
     }
 
     /// Draws the polygons as one layer.
-    pub(super) fn draw(&self, svg: &mut Svg, axes: &Axes) {
-        svg.translucent(OPACITY, |svg| {
+    pub(super) fn draw(&self, picture: &mut Picture, axes: &Axes) {
+        picture.translucent(OPACITY, |picture| {
             for Polygon { corners, facing } in &self.polygons {
                 let grey = (150.0 + 80.0 * facing).round() as u8;
-                let color = format!("#{grey:02x}{grey:02x}{grey:02x}");
-                svg.polygon(corners.iter().map(|corner| axes.place((corner[0], corner[1]))), &color);
+                picture.polygon(corners.iter().map(|corner| axes.place((corner[0], corner[1]))), [grey; 3]);
             }
         });
     }

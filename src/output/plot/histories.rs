@@ -2,6 +2,7 @@
 
 use super::chart::{Line, Panel};
 use super::palette;
+use super::picture::Color;
 use super::table::Columns;
 use crate::output::OutputError;
 
@@ -12,7 +13,7 @@ const MOST: usize = 8;
 pub(super) const ROUND_OFF: f64 = 1e-12;
 
 /// Colours of components. A tensor with more components repeats the first colours.
-const COLORS: [&str; 6] =
+const COLORS: [Color; 6] =
     [palette::BLUE, palette::VERMILLION, palette::GREEN, palette::PURPLE, palette::SKY, palette::BLACK];
 
 /// Gives panels of the same quantity axes of the same length, so that round-off is not drawn like a force.

@@ -1,8 +1,8 @@
 //! `report.html`: the pictures and the numbers of a run on one page that needs nothing else.
 
+use super::picture::escaped;
 use super::player::Played;
 use super::run_report::has_inertia;
-use super::svg::escaped;
 use serde_json::Value;
 
 /// Script of the player.

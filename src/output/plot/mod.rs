@@ -2,8 +2,7 @@
 //! the particles of the last snapshot. The page `report.html` shows the charts, the numbers of the run and a player of its snapshots. The
 //! page needs no other file.
 //!
-//! Pictures are drawn as SVG, with axes and names measured in the font DejaVu Sans. PNG files are rendered from the SVG. The program
-//! contains the font, so no fonts need to be installed.
+//! A picture becomes SVG or PNG. The program contains the font, DejaVu Sans, so no fonts need to be installed.
 
 mod axes;
 mod box_edges;
@@ -11,20 +10,22 @@ mod chart;
 mod colouring;
 mod convergence;
 mod facets;
+mod font;
 mod histories;
 mod html;
 mod neighbours;
 mod palette;
 mod particles;
+mod picture;
 mod player;
-pub mod png;
+mod png;
 mod run_report;
 mod segments;
-mod svg;
 mod table;
 mod view;
 
 pub use convergence::newton_norms;
+pub use picture::Picture;
 pub use view::View;
 
 use super::files::write_atomically;
@@ -37,6 +38,7 @@ use chart::{Heading, Line, Panel};
 use colouring::Colouring;
 use histories::ROUND_OFF;
 use particles::Surfaces;
+use picture::Color;
 use player::Recording;
 use run_report::{has_inertia, quantity, title};
 use serde_json::Value;
@@ -56,7 +58,7 @@ const TABLES: [(&str, &str); 4] = [
     ("contacts", "Contact: forces of the first body on the second"),
 ];
 
-/// Height of a picture, in SVG units.
+/// Height of a picture.
 const HEIGHT: f64 = 640.0;
 
 /// File name of the page.
@@ -146,14 +148,15 @@ pub fn plot_run(directory: &Path, look: &Look) -> Result<Vec<PathBuf>, OutputErr
         written.push(path);
         Ok(())
     };
-    for (name, svg) in pictures.iter().chain(&particles) {
+    for (name, picture) in pictures.iter().chain(&particles) {
         for &format in &look.formats {
             let file = format!("{name}.{format}");
-            if format == "png" { keep(&file, &png::from_svg(name, svg)?)? } else { keep(&file, svg.as_bytes())? }
+            keep(&file, &if format == "png" { picture.png(name)? } else { picture.svg().into_bytes() })?;
         }
     }
     let played = recording.as_ref().map(Recording::page);
-    keep(PAGE, html::page(&report, played.as_ref(), &pictures).as_bytes())?;
+    let charts: Vec<_> = pictures.iter().map(|(name, picture)| (*name, picture.svg())).collect();
+    keep(PAGE, html::page(&report, played.as_ref(), &charts).as_bytes())?;
     Ok(written)
 }
 
@@ -185,7 +188,7 @@ fn scene(look: &Look, recording: &Recording, span: (f64, f64), report: &Value) -
 }
 
 /// The charts over time, with their names.
-fn charts(directory: &Path, report: &Value) -> Result<Vec<(&'static str, String)>, OutputError> {
+fn charts(directory: &Path, report: &Value) -> Result<Vec<(&'static str, Picture)>, OutputError> {
     let history = Columns::read(directory.join("history.csv"))?;
     let mut pictures = Vec::new();
     let mut draw = |name, what: &str, height, panels: &[Panel]| {
@@ -227,9 +230,8 @@ fn charts(directory: &Path, report: &Value) -> Result<Vec<(&'static str, String)
 }
 
 /// Columns of the history as lines: each with its name, label and colour.
-fn lines(history: &Columns, columns: &[(&str, &str, &'static str)]) -> Result<Vec<Line>, OutputError> {
-    let line =
-        |(name, label, color): &(&str, &str, &'static str)| Ok(Line::new(label, color, history.pairs("time", name)?));
+fn lines(history: &Columns, columns: &[(&str, &str, Color)]) -> Result<Vec<Line>, OutputError> {
+    let line = |(name, label, color): &(&str, &str, Color)| Ok(Line::new(label, *color, history.pairs("time", name)?));
     columns.iter().map(line).collect()
 }
 
@@ -293,8 +295,8 @@ pub fn plot_frames(directory: &Path, frames: &Path, look: &Look) -> Result<Vec<P
     for (number, path) in snapshots.iter().enumerate() {
         let snapshot = Snapshot::read(path)?;
         let colouring = Colouring::chosen(&snapshot, look.field.as_deref())?;
-        let svg = particles::draw(&snapshot, &surfaces(path)?, &scene, colouring.as_ref());
-        let (png, path) = (png::from_svg("a frame", &svg)?, frames.join(format!("frame_{number:04}.png")));
+        let picture = particles::draw(&snapshot, &surfaces(path)?, &scene, colouring.as_ref());
+        let (png, path) = (picture.png("a frame")?, frames.join(format!("frame_{number:04}.png")));
         write_atomically(&path, |file| file.write_all(&png))?;
         written.push(path);
     }

@@ -1,17 +1,19 @@
-//! Colours that remain distinct to colour-blind readers, as SVG writes them.
+//! Colours that remain distinct to colour-blind readers.
+
+use super::picture::Color;
 
 // Okabe and Ito, "Color Universal Design", 2008.
-pub(super) const BLACK: &str = "#000000";
-pub(super) const BLUE: &str = "#0072b2";
-pub(super) const SKY: &str = "#56b4e9";
-pub(super) const VERMILLION: &str = "#d55e00";
-pub(super) const GREEN: &str = "#009e73";
-pub(super) const PURPLE: &str = "#cc79a7";
+pub(super) const BLACK: Color = [0x00, 0x00, 0x00];
+pub(super) const BLUE: Color = [0x00, 0x72, 0xb2];
+pub(super) const SKY: Color = [0x56, 0xb4, 0xe9];
+pub(super) const VERMILLION: Color = [0xd5, 0x5e, 0x00];
+pub(super) const GREEN: Color = [0x00, 0x9e, 0x73];
+pub(super) const PURPLE: Color = [0xcc, 0x79, 0xa7];
 
 /// Frames, ticks and secondary text.
-pub(super) const GREY: &str = "#464646";
+pub(super) const GREY: Color = [0x46, 0x46, 0x46];
 /// Grid lines.
-pub(super) const LIGHT: &str = "#dedede";
+pub(super) const LIGHT: Color = [0xde, 0xde, 0xde];
 
 /// Viridis (Smith, van der Walt; CC0), every eighth of its range.
 pub(super) const VIRIDIS: [[f64; 3]; 9] = [
@@ -27,11 +29,11 @@ pub(super) const VIRIDIS: [[f64; 3]; 9] = [
 ];
 
 /// The colour of `x` in [0, 1]. A value outside gets the colour of the nearest end, NaN the colour of 0.
-pub(super) fn viridis(x: f64) -> String {
+pub(super) fn viridis(x: f64) -> Color {
     let last = VIRIDIS.len() - 1;
     let place = if x.is_nan() { 0.0 } else { x.clamp(0.0, 1.0) * last as f64 };
     let piece = (place as usize).min(last - 1);
     let weight = place - piece as f64;
     let mix = |k: usize| (VIRIDIS[piece][k] * (1.0 - weight) + VIRIDIS[piece + 1][k] * weight).round() as u8;
-    format!("#{:02x}{:02x}{:02x}", mix(0), mix(1), mix(2))
+    [mix(0), mix(1), mix(2)]
 }

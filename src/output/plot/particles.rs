@@ -5,10 +5,11 @@ use super::box_edges::{self, corner};
 use super::chart::Heading;
 use super::colouring::Colouring;
 use super::facets::Facets;
+use super::font::width;
 use super::neighbours::Neighbours;
 use super::palette::{BLACK, BLUE, GREY, LIGHT, viridis};
+use super::picture::{Anchor, Color, Picture};
 use super::segments;
-use super::svg::{Anchor, Svg, width};
 use super::view::Directions;
 use crate::output::history::AXES;
 use crate::output::moved_outlines::MAX_CELLS;
@@ -70,7 +71,7 @@ struct Frame<'a> {
 }
 
 /// The picture as SVG. In one dimension the field is drawn over x.
-pub(super) fn draw(snapshot: &Snapshot, surfaces: &Surfaces, scene: &Scene, colouring: Option<&Colouring>) -> String {
+pub(super) fn draw(snapshot: &Snapshot, surfaces: &Surfaces, scene: &Scene, colouring: Option<&Colouring>) -> Picture {
     let span = range([scene.span.0, scene.span.1].into_iter(), 0.0);
     let label = colouring.map_or("particles", |one| &one.label);
     let stride = snapshot.points.len().div_ceil(MAX_DRAWN).max(1);
@@ -92,30 +93,30 @@ pub(super) fn draw(snapshot: &Snapshot, surfaces: &Surfaces, scene: &Scene, colo
     let bar = Ticks::new(span, (size.1 / 60.0) as usize, false);
     let beside = if colouring.is_some() { 24.0 + 16.0 + 10.0 + bar.width() + 2.0 * LABEL + 8.0 } else { 20.0 };
     let wide = left + size.0 + beside;
-    let mut svg = heading.picture(wide, Heading::HEIGHT + size.1 + BELOW);
+    let mut picture = heading.picture(wide, Heading::HEIGHT + size.1 + BELOW);
     let axes = Axes { corner: (left, Heading::HEIGHT), size, x, y };
     let mut labels = Vec::new();
     match flat {
         Some([right, up]) => {
-            grid(&mut svg, snapshot, &axes, [right, up], scale);
-            axes.draw(&mut svg, [&ticks[0], &ticks[1]], [AXES[right], AXES[up]], false);
+            grid(&mut picture, snapshot, &axes, [right, up], scale);
+            axes.draw(&mut picture, [&ticks[0], &ticks[1]], [AXES[right], AXES[up]], false);
         }
-        None => labels = box_edges::draw(&mut svg, &scene.directions, scene.bounds, &axes),
+        None => labels = box_edges::draw(&mut picture, &scene.directions, scene.bounds, &axes),
     }
     match (&surfaces.obstacles, flat) {
-        (Some(obstacles), _) if obstacles.corners == 3 => frame.in_space(&mut svg, &axes, span, Some(obstacles)),
+        (Some(obstacles), _) if obstacles.corners == 3 => frame.in_space(&mut picture, &axes, span, Some(obstacles)),
         (Some(obstacles), Some(plane)) if obstacles.corners == 2 => {
-            frame.bodies(&mut svg, &axes, span, surfaces.bodies.as_ref());
-            segments::draw(&mut svg, obstacles, &axes, plane);
+            frame.bodies(&mut picture, &axes, span, surfaces.bodies.as_ref());
+            segments::draw(&mut picture, obstacles, &axes, plane);
         }
-        _ => frame.bodies(&mut svg, &axes, span, surfaces.bodies.as_ref()),
+        _ => frame.bodies(&mut picture, &axes, span, surfaces.bodies.as_ref()),
     }
     // Obstacles may lie under the labels of the box.
-    labels.iter().for_each(|label| label.draw(&mut svg));
+    labels.iter().for_each(|label| label.draw(&mut picture));
     if colouring.is_some() {
-        colour_bar(&mut svg, &axes, span, &bar, label);
+        colour_bar(&mut picture, &axes, span, &bar, label);
     }
-    svg.finish()
+    picture
 }
 
 /// Widens a range to the smallest size of a drawing. Returns its length in the picture.
@@ -155,7 +156,7 @@ impl Scene {
 }
 
 /// Draws the grid lines, unless they would be a grey area.
-fn grid(svg: &mut Svg, snapshot: &Snapshot, axes: &Axes, plane: [usize; 2], scale: f64) {
+fn grid(picture: &mut Picture, snapshot: &Snapshot, axes: &Axes, plane: [usize; 2], scale: f64) {
     let (spacing, origin) = (snapshot.background.spacing, snapshot.background.origin);
     if axes.size.0.max(axes.size.1) / (spacing * scale) > MAX_LINES {
         return;
@@ -167,10 +168,10 @@ fn grid(svg: &mut Svg, snapshot: &Snapshot, axes: &Axes, plane: [usize; 2], scal
         (first as i64..=last as i64).map(move |k| origin[axis] + spacing * k as f64)
     };
     for x in inside(axes.x, plane[0]) {
-        svg.line([axes.place((x, axes.y.0)), axes.place((x, axes.y.1))], LIGHT, 0.8);
+        picture.line([axes.place((x, axes.y.0)), axes.place((x, axes.y.1))], LIGHT, 0.8);
     }
     for y in inside(axes.y, plane[1]) {
-        svg.line([axes.place((axes.x.0, y)), axes.place((axes.x.1, y))], LIGHT, 0.8);
+        picture.line([axes.place((axes.x.0, y)), axes.place((axes.x.1, y))], LIGHT, 0.8);
     }
 }
 
@@ -181,16 +182,16 @@ impl Frame<'_> {
     }
 
     /// The colour of a particle, for a range of values.
-    fn color(&self, p: usize, (low, high): (f64, f64)) -> String {
-        self.value(p).map_or_else(|| BLUE.to_owned(), |value| viridis((value - low) / (high - low)))
+    fn color(&self, p: usize, (low, high): (f64, f64)) -> Color {
+        self.value(p).map_or(BLUE, |value| viridis((value - low) / (high - low)))
     }
 
     /// Draws the particles of a plane: cells, cut by the outlines of the bodies if there are any. More particles than [`MAX_CELLS`] are discs.
-    fn bodies(&self, svg: &mut Svg, axes: &Axes, span: (f64, f64), outlines: Option<&Snapshot>) {
+    fn bodies(&self, picture: &mut Picture, axes: &Axes, span: (f64, f64), outlines: Option<&Snapshot>) {
         let Self { snapshot, scene: Scene { directions, .. }, ids, .. } = self;
         let in_plane = snapshot.background.dimension == 2 && directions.plane() == Some([0, 1]);
         if !in_plane || ids.len() > MAX_CELLS {
-            self.in_space(svg, axes, span, None);
+            self.in_space(picture, axes, span, None);
             return;
         }
         let neighbours = Neighbours::new(snapshot, ids);
@@ -198,24 +199,24 @@ impl Frame<'_> {
         let place = |corner: Vector<f64, 2>| axes.place((corner[0], corner[1]));
         let Some(outlines) = outlines else {
             for &p in ids.iter().filter(finite) {
-                svg.polygon(neighbours.cell(p).into_iter().map(place), &self.color(p, span));
+                picture.polygon(neighbours.cell(p).into_iter().map(place), self.color(p, span));
             }
             return;
         };
         let lines = segments::closed_lines(outlines, axes);
-        svg.inside(&lines, |svg| {
+        picture.inside(lines.clone(), |picture| {
             for &p in ids.iter().filter(finite) {
-                svg.polygon(neighbours.wide_cell(p).into_iter().map(place), &self.color(p, span));
+                picture.polygon(neighbours.wide_cell(p).into_iter().map(place), self.color(p, span));
             }
         });
         for line in &lines {
-            svg.line(line.iter().chain(line.first()).copied(), BLACK, 0.6);
+            picture.line(line.iter().chain(line.first()).copied(), BLACK, 0.6);
         }
     }
 
     /// Draws the particles as discs, and the facets of obstacles between those that the obstacles hide and those that they do not. The disc
     /// nearest to the eye is drawn last.
-    fn in_space(&self, svg: &mut Svg, axes: &Axes, span: (f64, f64), obstacles: Option<&Snapshot>) {
+    fn in_space(&self, picture: &mut Picture, axes: &Axes, span: (f64, f64), obstacles: Option<&Snapshot>) {
         let Self { snapshot, scene, ids, .. } = self;
         let directions = &scene.directions;
         let neighbours = Neighbours::new(snapshot, ids);
@@ -224,46 +225,46 @@ impl Frame<'_> {
         let mut order: Vec<usize> = ids.iter().copied().filter(finite).collect();
         order.sort_by(|a, b| depth(a).total_cmp(&depth(b)));
         let scale = axes.size.0 / (axes.x.1 - axes.x.0);
-        let disc = |svg: &mut Svg, p: usize| {
+        let disc = |picture: &mut Picture, p: usize| {
             let at = axes.place(directions.project(snapshot.points[p]));
             let color = self.color(p, span);
-            let rim = if snapshot.background.dimension == 3 { GREY } else { &color };
-            svg.disc(at, (RADIUS * neighbours.diameter(p) * scale).max(0.7), &color, rim);
+            let rim = if snapshot.background.dimension == 3 { GREY } else { color };
+            picture.disc(at, (RADIUS * neighbours.diameter(p) * scale).max(0.7), color, rim);
         };
         let facets = obstacles.map(|obstacles| Facets::new(obstacles, directions, scene.around(snapshot)));
         let hides = |p: &usize| facets.as_ref().is_some_and(|facets| facets.hide(snapshot.points[*p]));
         let (hidden, seen): (Vec<usize>, Vec<usize>) = order.into_iter().partition(hides);
-        hidden.into_iter().for_each(|p| disc(svg, p));
+        hidden.into_iter().for_each(|p| disc(picture, p));
         if let Some(facets) = facets {
             let (left, right, below, above) = (axes.x.0, axes.x.1, axes.y.0, axes.y.1);
             let drawing = [(left, below), (right, below), (right, above), (left, above)].map(|at| axes.place(at));
-            svg.inside(&[drawing.to_vec()], |svg| facets.draw(svg, axes));
+            picture.inside(vec![drawing.to_vec()], |picture| facets.draw(picture, axes));
         }
-        seen.into_iter().for_each(|p| disc(svg, p));
+        seen.into_iter().for_each(|p| disc(picture, p));
     }
 
     /// The picture in one dimension: the field over x.
-    fn over_x(&self, heading: &Heading) -> String {
+    fn over_x(&self, heading: &Heading) -> Picture {
         let (x, _) = self.scene.window(self.snapshot);
         let y = range([self.scene.span.0, self.scene.span.1].into_iter(), 0.05);
         let ticks = [Ticks::new(x, 10, false), Ticks::new(y, 7, false)];
         let (left, size) = (Axes::left(&ticks[1]), (MAX_WIDTH, MAX_WIDTH / 2.0));
-        let mut svg = heading.picture(left + size.0 + 24.0, Heading::HEIGHT + size.1 + BELOW);
+        let mut picture = heading.picture(left + size.0 + 24.0, Heading::HEIGHT + size.1 + BELOW);
         let axes = Axes { corner: (left, Heading::HEIGHT), size, x, y };
         let label = self.colouring.map_or("", |one| &one.label);
-        axes.draw(&mut svg, [&ticks[0], &ticks[1]], ["x", label], true);
+        axes.draw(&mut picture, [&ticks[0], &ticks[1]], ["x", label], true);
         for &p in &self.ids {
             let at = (self.snapshot.points[p][0], self.value(p).unwrap_or(0.0));
             if at.0.is_finite() && at.1.is_finite() {
-                svg.disc(axes.place(at), 2.5, BLUE, BLUE);
+                picture.disc(axes.place(at), 2.5, BLUE, BLUE);
             }
         }
-        svg.finish()
+        picture
     }
 }
 
 /// Draws the colour bar at the right of the drawing.
-fn colour_bar(svg: &mut Svg, axes: &Axes, (low, high): (f64, f64), ticks: &Ticks, label: &str) {
+fn colour_bar(picture: &mut Picture, axes: &Axes, (low, high): (f64, f64), ticks: &Ticks, label: &str) {
     const STEPS: usize = 128;
     let (left, top, tall) = (axes.corner.0 + axes.size.0 + 24.0, axes.corner.1, axes.size.1);
     let height = |part: f64| top + tall * (1.0 - part);
@@ -271,18 +272,18 @@ fn colour_bar(svg: &mut Svg, axes: &Axes, (low, high): (f64, f64), ticks: &Ticks
         let (from, to) = (k as f64 / STEPS as f64, (k + 1) as f64 / STEPS as f64);
         let corners =
             [(left, height(from)), (left + 16.0, height(from)), (left + 16.0, height(to)), (left, height(to))];
-        svg.polygon(corners, &viridis((from + to) / 2.0));
+        picture.polygon(corners, viridis((from + to) / 2.0));
     }
     for &at in &ticks.at {
         let y = height((at - low) / (high - low));
-        svg.line([(left + 16.0, y), (left + 21.0, y)], GREY, 1.0);
-        svg.text((left + 25.0, y + 0.35 * LABEL), Anchor::Start, LABEL, BLACK, &ticks.label(at));
+        picture.line([(left + 16.0, y), (left + 21.0, y)], GREY, 1.0);
+        picture.text((left + 25.0, y + 0.35 * LABEL), Anchor::Start, LABEL, BLACK, &ticks.label(at));
     }
     let at = (left + 25.0 + ticks.width() + 20.0, top + tall / 2.0);
     let name = ticks.name(label);
     // A name longer than the bar is left out, because the heading has it.
     let name = if width(&name, LABEL) > tall { ticks.name("") } else { name };
-    svg.text(at, Anchor::Upright, LABEL, BLACK, &name);
+    picture.text(at, Anchor::Upright, LABEL, BLACK, &name);
 }
 
 #[cfg(test)]
@@ -313,7 +314,7 @@ mod tests {
         }
     }
 
-    fn picture(snapshot: &Snapshot, view: Option<View>) -> Result<String, OutputError> {
+    fn picture(snapshot: &Snapshot, view: Option<View>) -> Result<Picture, OutputError> {
         let colouring = Colouring::chosen(snapshot, None)?;
         let end = |start: f64, pick: fn(f64, f64) -> f64| -> [f64; 3] {
             std::array::from_fn(|axis| snapshot.points.iter().map(|x| x[axis]).fold(start, pick))
@@ -334,8 +335,8 @@ mod tests {
             .into_iter()
             .chain(views.into_iter().map(|view| (3, view, 100.0)))
         {
-            let svg = picture(&lattice(dimension, from), view)?;
-            let (size, texts) = texts(&svg)?;
+            let picture = picture(&lattice(dimension, from), view)?;
+            let (size, texts) = (picture.size, texts(&picture));
             assert!(texts.len() > 8 && texts.iter().any(|(text, _)| text == "Von Mises stress, t = 0.3"), "{texts:?}");
             for (k, (text, one)) in texts.iter().enumerate() {
                 let inside = one.left >= 0.0 && one.top >= 0.0 && one.right <= size.0 && one.bottom <= size.1;
@@ -350,7 +351,7 @@ mod tests {
     #[test]
     fn a_body_in_the_plane_is_filled_with_cells_and_one_in_space_with_discs() -> Result<(), OutputError> {
         let count = |svg: &str, kind: &str| svg.matches(kind).count();
-        let (plane, space) = (picture(&lattice(2, 0.0), None)?, picture(&lattice(3, 0.0), None)?);
+        let (plane, space) = (picture(&lattice(2, 0.0), None)?.svg(), picture(&lattice(3, 0.0), None)?.svg());
         // The colour bar has 128 polygons.
         assert_eq!((count(&plane, "<polygon"), count(&plane, "<circle")), (16 + 128, 0));
         assert_eq!((count(&space, "<polygon"), count(&space, "<circle")), (128, 64));

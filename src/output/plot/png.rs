@@ -1,48 +1,130 @@
-//! PNG from SVG.
+//! Pictures as PNG.
 
+use super::font;
+use super::picture::{Anchor, Color, Element, Picture, Point, Text};
 use crate::output::OutputError;
-use resvg::{tiny_skia, usvg};
+use tiny_skia::{FillRule, LineJoin, Mask, Paint, Path, PathBuilder, Pixmap, PixmapPaint, Stroke, Transform};
 
-/// Pixels per unit of the SVG.
+/// Pixels per unit of a picture.
 const SCALE: f32 = 2.0;
 
-/// The family of the embedded font.
-const FAMILY: &str = "DejaVu Sans";
-
-/// Renders an SVG on white, at two pixels per unit. `name` names the picture in an error.
-///
-/// ```
-/// use bfree::output::plot::png::from_svg;
-///
-/// let png = from_svg("a square", r#"<svg xmlns="http://www.w3.org/2000/svg" width="30" height="20"/>"#)?;
-/// // Width and height stand in the first chunk, at two pixels to a unit.
-/// assert_eq!((&png[..4], &png[16..24]), (b"\x89PNG".as_slice(), [0, 0, 0, 60, 0, 0, 0, 40].as_slice()));
-/// # Ok::<(), bfree::output::OutputError>(())
-/// ```
-///
-/// # Errors
-/// The SVG cannot be read or drawn.
-pub fn from_svg(name: &'static str, svg: &str) -> Result<Vec<u8>, OutputError> {
-    let fail = |reason: String| OutputError::Draw { name, reason };
-    let tree = tree(name, svg)?;
-    let size = tree.size().to_int_size();
-    let pixels = |length: u32| (length as f32 * SCALE) as u32;
-    let (width, height) = (pixels(size.width()), pixels(size.height()));
-    let mut pixmap = tiny_skia::Pixmap::new(width, height).ok_or_else(|| fail(format!("{width} x {height} pixels")))?;
-    pixmap.fill(tiny_skia::Color::WHITE);
-    resvg::render(&tree, tiny_skia::Transform::from_scale(SCALE, SCALE), &mut pixmap.as_mut());
-    pixmap.encode_png().map_err(|error| fail(error.to_string()))
+impl Picture {
+    /// The content of a PNG file, at two pixels per unit on white. `name` names the picture in an error.
+    ///
+    /// # Errors
+    /// The picture has no pixels, or more than fit into memory.
+    pub fn png(&self, name: &'static str) -> Result<Vec<u8>, OutputError> {
+        let fail = |reason: String| OutputError::Draw { name, reason };
+        let (width, height) = self.size;
+        let pixels = |length: f64| (length.round() as f32 * SCALE) as u32;
+        let (width, height) = (pixels(width), pixels(height));
+        let pixmap = Pixmap::new(width, height).ok_or_else(|| fail(format!("{width} x {height} pixels")))?;
+        let mut canvas = Canvas { pixmap, mask: None };
+        canvas.pixmap.fill(tiny_skia::Color::WHITE);
+        canvas.draw(&self.elements);
+        canvas.pixmap.encode_png().map_err(|error| fail(error.to_string()))
+    }
 }
 
-fn tree(name: &'static str, svg: &str) -> Result<usvg::Tree, OutputError> {
-    let mut options = usvg::Options::default();
-    let fonts = options.fontdb_mut();
-    fonts.load_font_data(dejavu::sans::regular().to_vec());
-    fonts.set_sans_serif_family(FAMILY);
-    usvg::Tree::from_str(svg, &options).map_err(|error| OutputError::Draw { name, reason: error.to_string() })
+/// The pixels, and the part of them that may be changed.
+struct Canvas {
+    pixmap: Pixmap,
+    mask: Option<Mask>,
 }
 
-/// Extent of a text.
+impl Canvas {
+    fn draw(&mut self, elements: &[Element]) {
+        for element in elements {
+            match element {
+                Element::Line { points, color, width } => self.stroke(polyline(points, false), *color, *width),
+                Element::Polygon { points, color } => {
+                    self.fill(polyline(points, true), *color);
+                    self.stroke(polyline(points, true), *color, Picture::RIM);
+                }
+                Element::Disc { center: (x, y), radius, color, rim } => {
+                    let circle = || PathBuilder::from_circle(*x as f32, *y as f32, *radius as f32);
+                    self.fill(circle(), *color);
+                    self.stroke(circle(), *rim, Picture::DISC_RIM);
+                }
+                Element::Text(text) => self.fill(letters(text), text.color),
+                Element::Inside { lines, elements } => self.inside(lines, elements),
+                Element::Translucent { opacity, elements } => self.translucent(*opacity, elements),
+            }
+        }
+    }
+
+    fn fill(&mut self, path: Option<Path>, color: Color) {
+        if let Some(path) = path {
+            self.pixmap.fill_path(&path, &paint(color), FillRule::Winding, scaled(), self.mask.as_ref());
+        }
+    }
+
+    fn stroke(&mut self, path: Option<Path>, color: Color, width: f64) {
+        let stroke = Stroke { width: width as f32, line_join: LineJoin::Round, ..Stroke::default() };
+        if let Some(path) = path {
+            self.pixmap.stroke_path(&path, &paint(color), &stroke, scaled(), self.mask.as_ref());
+        }
+    }
+
+    fn inside(&mut self, lines: &[Vec<Point>], elements: &[Element]) {
+        let mut path = PathBuilder::new();
+        lines.iter().filter_map(|line| polyline(line, true)).for_each(|line| path.push_path(&line));
+        let (Some(path), Some(mut mask)) = (path.finish(), Mask::new(self.pixmap.width(), self.pixmap.height())) else {
+            return;
+        };
+        mask.fill_path(&path, FillRule::Winding, true, scaled());
+        let outside = self.mask.replace(mask);
+        self.draw(elements);
+        self.mask = outside;
+    }
+
+    fn translucent(&mut self, opacity: f64, elements: &[Element]) {
+        let Some(pixmap) = Pixmap::new(self.pixmap.width(), self.pixmap.height()) else { return };
+        let mut layer = Self { pixmap, mask: self.mask.take() };
+        layer.draw(elements);
+        self.mask = layer.mask;
+        let paint = PixmapPaint { opacity: opacity as f32, ..PixmapPaint::default() };
+        self.pixmap.draw_pixmap(0, 0, layer.pixmap.as_ref(), &paint, Transform::identity(), None);
+    }
+}
+
+fn scaled() -> Transform {
+    Transform::from_scale(SCALE, SCALE)
+}
+
+fn paint([r, g, b]: Color) -> Paint<'static> {
+    let mut paint = Paint::default();
+    paint.set_color_rgba8(r, g, b, 255);
+    paint
+}
+
+/// The line through `points`; `None` for less than two.
+fn polyline(points: &[Point], closed: bool) -> Option<Path> {
+    let mut path = PathBuilder::new();
+    for (number, (x, y)) in points.iter().enumerate() {
+        let (x, y) = (*x as f32, *y as f32);
+        if number == 0 { path.move_to(x, y) } else { path.line_to(x, y) }
+    }
+    if closed {
+        path.close();
+    }
+    path.finish()
+}
+
+/// The letters of a text at their place.
+fn letters(text: &Text) -> Option<Path> {
+    let width = font::width(&text.text, text.size);
+    let start = match text.anchor {
+        Anchor::Start => 0.0,
+        Anchor::Middle | Anchor::Upright => -width / 2.0,
+        Anchor::End => -width,
+    };
+    let turn = if text.anchor == Anchor::Upright { -90.0 } else { 0.0 };
+    let place = Transform::from_rotate(turn).post_translate(text.at.0 as f32, text.at.1 as f32);
+    font::outline(&text.text, text.size)?.transform(place.pre_translate(start as f32, 0.0))
+}
+
+/// The part of a picture that a text covers.
 #[cfg(test)]
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Extent {
@@ -60,24 +142,17 @@ impl Extent {
     }
 }
 
-/// Width and height in pixels.
+/// The texts of a picture.
 #[cfg(test)]
-type Size = (f64, f64);
-
-/// The size of a picture, and its texts.
-#[cfg(test)]
-pub(super) fn texts(svg: &str) -> Result<(Size, Vec<(String, Extent)>), OutputError> {
-    let tree = tree("texts", svg)?;
-    let text = |node: &usvg::Node| match node {
-        usvg::Node::Text(text) => {
-            let (chunks, extent) = (text.chunks(), text.abs_bounding_box());
+pub(super) fn texts(picture: &Picture) -> Vec<(String, Extent)> {
+    let text = |element: &Element| match element {
+        Element::Text(text) => {
+            let bounds = letters(text)?.bounds();
             let [left, top, right, bottom] =
-                [extent.left(), extent.top(), extent.right(), extent.bottom()].map(f64::from);
-            let letters = chunks.iter().map(usvg::TextChunk::text).collect();
-            Some((letters, Extent { left, top, right, bottom }))
+                [bounds.left(), bounds.top(), bounds.right(), bounds.bottom()].map(f64::from);
+            Some((text.text.clone(), Extent { left, top, right, bottom }))
         }
         _ => None,
     };
-    let size = (f64::from(tree.size().width()), f64::from(tree.size().height()));
-    Ok((size, tree.root().children().iter().filter_map(text).collect()))
+    picture.elements.iter().filter_map(text).collect()
 }

@@ -2,15 +2,15 @@
 
 use super::axes::Axes;
 use super::palette::BLACK;
-use super::svg::{Point, Svg};
+use super::picture::{Picture, Point};
 use crate::output::vtu::Snapshot;
 
 /// Draws the segments of obstacles in the plane, clipped to the drawing.
-pub(super) fn draw(svg: &mut Svg, obstacles: &Snapshot, axes: &Axes, [right, up]: [usize; 2]) {
+pub(super) fn draw(picture: &mut Picture, obstacles: &Snapshot, axes: &Axes, [right, up]: [usize; 2]) {
     for ends in obstacles.points.chunks_exact(2) {
         let at = |end: [f64; 3]| [end[right], end[up]];
         if let Some(inside) = clipped([at(ends[0]), at(ends[1])], [axes.x, axes.y]) {
-            svg.line(inside.map(|[x, y]| axes.place((x, y))), BLACK, 1.6);
+            picture.line(inside.map(|[x, y]| axes.place((x, y))), BLACK, 1.6);
         }
     }
 }
