@@ -55,7 +55,13 @@ impl<const D: usize> Cone<D> {
                 outline.push(Vector::from([s, 0.0]));
             }
         }
-        Some(Self { ends, radii, along, across: across / across.norm(), profile: Polygon::oriented(outline) })
+        Some(Self {
+            ends,
+            radii,
+            along,
+            across: across / across.norm(),
+            profile: Polygon::joined(&[outline]).oriented(),
+        })
     }
 
     /// The position (s, ρ) of `x` in the section, and the unit vector away from the axis.

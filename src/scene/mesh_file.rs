@@ -1,0 +1,243 @@
+//! Physical groups of meshes of Gmsh as shapes.
+
+use super::file::{FileError, ending, open_mesh};
+use super::msh::Mesh;
+use crate::problems::Problems;
+use crate::shape::{Polygon, PolygonError, Shape, Sheet, Surface};
+use crate::simulation::as_type;
+use crate::tensor::Vector;
+use nalgebra::Vector3;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+/// The most edges around a group in 2D: all pairs of edges are compared.
+const MAX_EDGES: usize = 20_000;
+
+/// The largest distance of a mesh in 2D from a plane, relative to its coordinates.
+const FLAT: f64 = 1e-9;
+
+/// A physical group of a mesh of Gmsh.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MeshFile {
+    /// Path of the file, which ends in `.msh`, relative to the scene's folder: format MSH 4.1, text or binary, elements of first order. In 2D, x
+    /// and y are read.
+    #[schemars(length(min = 1))]
+    pub file: PathBuf,
+    /// The name of a physical group, or the tag of a group without a name.
+    pub group: String,
+    /// The shape, once the file has been read.
+    #[serde(skip)]
+    read: OnceLock<Group>,
+}
+
+/// The shape of a group, in the dimension of the scene.
+#[derive(Clone, Debug, PartialEq)]
+enum Group {
+    Plane(Shape<2>),
+    Space(Shape<3>),
+}
+
+impl MeshFile {
+    /// The shape; `None` if it is not allowed, with the reasons in `problems`, and before the file has been read.
+    pub(super) fn build<const D: usize>(&self, problems: &mut Problems, path: &str) -> Option<Shape<D>> {
+        if D < 2 {
+            problems.refuse(path, "a mesh", "needs a grid of 2 or 3 dimensions");
+            return None;
+        }
+        let allowed = "must end in .msh";
+        problems.require(
+            ending(&self.file) == "msh",
+            &format!("{path}.file"),
+            format_args!("{:?}", self.file),
+            allowed,
+        );
+        match self.read.get()? {
+            Group::Plane(shape) => as_type(shape.clone()),
+            Group::Space(shape) => as_type(shape.clone()),
+        }
+    }
+
+    /// Whether the group is known to have no inside.
+    pub(super) fn is_sheet(&self) -> bool {
+        matches!(self.read.get(), Some(Group::Plane(Shape::Sheet(_)) | Group::Space(Shape::Sheet(_))))
+    }
+
+    /// Reads the file for a scene of this dimension, unless it has been read.
+    ///
+    /// # Errors
+    /// The errors of [`read_group`].
+    pub(super) fn read(&self, folder: &Path, dimension: usize) -> Result<(), FileError> {
+        if self.read.get().is_none() {
+            let path = folder.join(&self.file);
+            let _ = self.read.set(match dimension {
+                2 => Group::Plane(read_group(&path, &self.group)?),
+                _ => Group::Space(read_group(&path, &self.group)?),
+            });
+        }
+        Ok(())
+    }
+}
+
+/// The shape of a physical group of a mesh of Gmsh, for D = 2 or 3. A group of D dimensions is a solid: a [`Surface`], or in 2D a [`Polygon`].
+/// A group of one dimension less is a [`Sheet`].
+///
+/// ```
+/// use bfree::scene::mesh_file::read_group;
+/// use bfree::shape::Shape;
+/// use bfree::tensor::Vector;
+///
+/// // A triangle, and one of its sides.
+/// let text = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$PhysicalNames\n2\n1 7 \"side\"\n2 5 \"part\"\n$EndPhysicalNames\n\
+///     $Entities\n0 1 1 0\n1 0 0 0 1 0 0 1 7 0\n1 0 0 0 1 1 0 1 5 0\n$EndEntities\n\
+///     $Nodes\n1 3 1 3\n2 1 0 3\n1\n2\n3\n0 0 0\n1 0 0\n0 1 0\n$EndNodes\n\
+///     $Elements\n2 2 1 2\n1 1 1 1\n1 1 2\n2 1 2 1\n2 1 2 3\n$EndElements\n";
+/// let file = tempfile::Builder::new().suffix(".msh").tempfile()?;
+/// std::fs::write(file.path(), text)?;
+/// let part: Shape<2> = read_group(file.path(), "part")?;
+/// assert!(part.contains(&Vector::from([0.3, 0.3])) && !part.contains(&Vector::from([0.6, 0.6])));
+/// let side: Shape<2> = read_group(file.path(), "side")?;
+/// assert_eq!(side.signed_distance(&Vector::from([0.5, 0.25])), 0.25);
+/// let error = read_group::<2>(file.path(), "top").unwrap_err().to_string();
+/// assert_eq!(error, "has no physical surface or curve \"top\"; its groups are: \"side\" (curve), \"part\" (surface)");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// The file cannot be read or is wrong (with the line, or the byte if it is binary), has no such group, or the group bounds no solid (with the
+/// position).
+pub fn read_group<const D: usize>(path: &Path, group: &str) -> Result<Shape<D>, FileError> {
+    if !(2..=3).contains(&D) {
+        return Err(FileError(format!("is a mesh, which has no groups for {D} dimensions")));
+    }
+    let mut bytes = Vec::new();
+    open_mesh(path)?.read_to_end(&mut bytes)?;
+    let mesh = Mesh::read(&bytes)?;
+    let (dimension, blocks) = mesh.group(group, D as i32)?;
+    let solid = dimension == D as i32;
+    let place = |tag: u64| mesh.nodes.get(&tag).map_or_else(Vector3::zeros, |x| Vector3::from(*x));
+    let mut faces = Vec::new();
+    for block in blocks {
+        for nodes in block.nodes.chunks_exact(block.size) {
+            let own =
+                faces_of(block.kind, D).iter().map(|face| face.map(|i| nodes.get(i).copied().unwrap_or_default()));
+            let own: Vec<Face> = own.collect();
+            // Elements may be turned inside out.
+            let turned = solid && measure::<D>(&own, place) < 0.0;
+            faces.extend(own.into_iter().map(|[a, b, c, d]| if turned { [d, c, b, a] } else { [a, b, c, d] }));
+        }
+    }
+    let simplices = simplices::<D>(if solid { boundary(faces) } else { faces });
+    // Numbers in the order of the tags.
+    let mut numbers: BTreeMap<u64, u32> = simplices.iter().flatten().map(|&tag| (tag, 0)).collect();
+    numbers.values_mut().zip(0..).for_each(|(number, next)| *number = next);
+    let simplices: Vec<[u32; D]> =
+        simplices.iter().map(|simplex| simplex.map(|tag| numbers.get(&tag).copied().unwrap_or_default())).collect();
+    let places: Vec<_> = numbers.keys().map(|&tag| place(tag)).collect();
+    let wrong = |why: String| FileError(format!("holds the group {group:?} with {why}"));
+    let first = places.first().copied().unwrap_or_default();
+    if let Some(x) = places.iter().find(|x| D == 2 && (x[2] - first[2]).abs() > FLAT * x.amax().max(first.amax())) {
+        return Err(wrong(format!("a node at {:?}, off the plane z = {}, in 2 dimensions", x.as_slice(), first[2])));
+    }
+    let vertices: Vec<Vector<f64, D>> = places.iter().map(|x| Vector::from_fn(|k, _| x[k])).collect();
+    if !solid {
+        return Sheet::new(&vertices, &simplices).map(Shape::from).ok_or_else(|| wrong("no element".to_owned()));
+    }
+    if D == 2 { polygon(&vertices, &simplices) } else { surface(vertices, &simplices) }.map_err(wrong)
+}
+
+/// The nodes of a face of an element in order around it, the last one repeated if there are fewer than four.
+type Face = [u64; 4];
+
+/// The faces of D − 1 dimensions of an element of this type, seen from outside: the element itself if it has D − 1 dimensions.
+fn faces_of(kind: i32, dimension: usize) -> &'static [[usize; 4]] {
+    match (dimension, kind) {
+        (2, 1) => &[[0, 1, 1, 1]],
+        (2, 2) => &[[0, 1, 1, 1], [1, 2, 2, 2], [2, 0, 0, 0]],
+        (2, 3) => &[[0, 1, 1, 1], [1, 2, 2, 2], [2, 3, 3, 3], [3, 0, 0, 0]],
+        (3, 2) => &[[0, 1, 2, 2]],
+        (3, 3) => &[[0, 1, 2, 3]],
+        (3, 4) => &[[0, 2, 1, 1], [0, 1, 3, 3], [0, 3, 2, 2], [1, 2, 3, 3]],
+        (3, 5) => &[[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]],
+        (3, 6) => &[[0, 2, 1, 1], [3, 4, 5, 5], [0, 1, 4, 3], [1, 2, 5, 4], [2, 0, 3, 5]],
+        (3, 7) => &[[0, 3, 2, 1], [0, 1, 4, 4], [1, 2, 4, 4], [2, 3, 4, 4], [3, 0, 4, 4]],
+        _ => &[],
+    }
+}
+
+/// A multiple of the area (2D) or volume of an element, by its faces.
+fn measure<const D: usize>(faces: &[Face], place: impl Fn(u64) -> Vector3<f64>) -> f64 {
+    let Some(origin) = faces.first().map(|face| place(face[0])) else { return 0.0 };
+    let of_face = |face: &Face| {
+        let [a, b, c, d] = face.map(|tag| place(tag) - origin);
+        if D == 2 { a[0] * d[1] - a[1] * d[0] } else { a.cross(&b).dot(&c) + a.cross(&c).dot(&d) }
+    };
+    faces.iter().map(of_face).sum()
+}
+
+/// The faces that belong to one element only.
+fn boundary(faces: Vec<Face>) -> Vec<Face> {
+    let mut alone = BTreeMap::new();
+    for face in faces {
+        // The nodes without repetitions, in the order of their tags.
+        let mut nodes = face.to_vec();
+        nodes.sort_unstable();
+        nodes.dedup();
+        if alone.remove(&nodes).is_none() {
+            alone.insert(nodes, face);
+        }
+    }
+    alone.into_values().collect()
+}
+
+/// The segments or triangles of faces. A quadrilateral is cut from its lowest tag, so that it has the same triangles seen from both sides.
+fn simplices<const D: usize>(faces: Vec<Face>) -> Vec<[u64; D]> {
+    let halves = |mut face: Face| {
+        let lowest = (0..4).min_by_key(|&i| face[i]).unwrap_or_default();
+        face.rotate_left(if D == 2 { 0 } else { lowest });
+        let [a, b, c, d] = face;
+        let halves = if D == 2 { [[a, d, d], [a, a, a]] } else { [[a, b, c], [a, c, d]] };
+        halves.into_iter().filter(|[a, b, c]| a != b && c != a && (b != c || D == 2))
+    };
+    faces.into_iter().flat_map(halves).map(|corners| std::array::from_fn(|k| corners[k])).collect()
+}
+
+/// The solid inside triangles.
+fn surface<const D: usize>(vertices: Vec<Vector<f64, D>>, triangles: &[[u32; D]]) -> Result<Shape<D>, String> {
+    let triangles = triangles.iter().map(|corners| [corners[0], corners[1], corners[D - 1]]).collect();
+    Ok(Surface::new(vertices, triangles).map_err(|error| error.to_string())?.into())
+}
+
+/// The polygon inside edges, each with the inside at the left.
+fn polygon<const D: usize>(vertices: &[Vector<f64, D>], edges: &[[u32; D]]) -> Result<Shape<D>, String> {
+    if edges.len() > MAX_EDGES {
+        return Err(format!(
+            "{} edges around it; at most {MAX_EDGES} are allowed: mesh its outline coarser",
+            edges.len()
+        ));
+    }
+    let at = |i: u32| vertices.get(i as usize).map_or(&[][..], |x| x.as_slice());
+    let mut next = BTreeMap::new();
+    for edge in edges {
+        if next.insert(edge[0], edge[1]).is_some() {
+            return Err(format!("an outline that meets itself at {:?}", at(edge[0])));
+        }
+    }
+    let (mut outlines, mut places) = (Vec::new(), Vec::new());
+    while let Some((first, mut end)) = next.pop_first() {
+        let mut outline = vec![first];
+        while end != first {
+            outline.push(end);
+            end = next.remove(&end).ok_or_else(|| format!("an outline that does not go on at {:?}", at(end)))?;
+        }
+        places.extend(outline.iter().copied());
+        outlines.push(outline.iter().filter_map(|&i| vertices.get(i as usize).copied()).collect());
+    }
+    let place = |vertex: usize| places.get(vertex).map_or(String::new(), |&i| format!(" at {:?}", at(i)));
+    let wrong = |error: PolygonError| format!("{error}{}", error.vertex().map_or(String::new(), place));
+    Ok(Polygon::of_outlines(&outlines).map_err(wrong)?.into())
+}
