@@ -30,16 +30,11 @@ pub struct MeshFile {
     pub file: PathBuf,
     /// The name of a physical group, or the tag of a group without a name.
     pub group: String,
-    /// The shape, once the file has been read.
+    /// The shape in 2D or 3D, once the file has been read.
     #[serde(skip)]
-    read: OnceLock<Group>,
-}
-
-/// The shape of a group, in the dimension of the scene.
-#[derive(Clone, Debug, PartialEq)]
-enum Group {
-    Plane(Shape<2>),
-    Space(Shape<3>),
+    plane: OnceLock<Shape<2>>,
+    #[serde(skip)]
+    space: OnceLock<Shape<3>>,
 }
 
 impl MeshFile {
@@ -49,35 +44,26 @@ impl MeshFile {
             problems.refuse(path, "a mesh", "needs a grid of 2 or 3 dimensions");
             return None;
         }
-        let allowed = "must end in .msh";
-        problems.require(
-            ending(&self.file) == "msh",
-            &format!("{path}.file"),
-            format_args!("{:?}", self.file),
-            allowed,
-        );
-        match self.read.get()? {
-            Group::Plane(shape) => as_type(shape.clone()),
-            Group::Space(shape) => as_type(shape.clone()),
-        }
+        let named = ending(&self.file) == "msh";
+        problems.require(named, &format!("{path}.file"), format_args!("{:?}", self.file), "must end in .msh");
+        if D == 2 { as_type(self.plane.get()?.clone()) } else { as_type(self.space.get()?.clone()) }
     }
 
-    /// Whether the group is known to have no inside.
+    /// Whether the group has been read and has no inside.
     pub(super) fn is_sheet(&self) -> bool {
-        matches!(self.read.get(), Some(Group::Plane(Shape::Sheet(_)) | Group::Space(Shape::Sheet(_))))
+        matches!(self.plane.get(), Some(Shape::Sheet(_))) || matches!(self.space.get(), Some(Shape::Sheet(_)))
     }
 
-    /// Reads the file for a scene of this dimension, unless it has been read.
+    /// Reads the file for a scene of 2 or 3 dimensions, unless it has been read.
     ///
     /// # Errors
     /// The errors of [`read_group`].
     pub(super) fn read(&self, folder: &Path, dimension: usize) -> Result<(), FileError> {
-        if self.read.get().is_none() {
-            let path = folder.join(&self.file);
-            let _ = self.read.set(match dimension {
-                2 => Group::Plane(read_group(&path, &self.group)?),
-                _ => Group::Space(read_group(&path, &self.group)?),
-            });
+        let path = folder.join(&self.file);
+        if dimension == 2 && self.plane.get().is_none() {
+            let _ = self.plane.set(read_group(&path, &self.group)?);
+        } else if dimension == 3 && self.space.get().is_none() {
+            let _ = self.space.set(read_group(&path, &self.group)?);
         }
         Ok(())
     }
@@ -103,7 +89,7 @@ impl MeshFile {
 /// let side: Shape<2> = read_group(file.path(), "side")?;
 /// assert_eq!(side.signed_distance(&Vector::from([0.5, 0.25])), 0.25);
 /// let error = read_group::<2>(file.path(), "top").unwrap_err().to_string();
-/// assert_eq!(error, "has no physical surface or curve \"top\"; its groups are: \"side\" (curve), \"part\" (surface)");
+/// assert_eq!(error, "has 0 physical groups \"top\"; must be the name of one surface or curve: [\"side\", \"part\"]");
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
@@ -120,34 +106,41 @@ pub fn read_group<const D: usize>(path: &Path, group: &str) -> Result<Shape<D>, 
     let (dimension, blocks) = mesh.group(group, D as i32)?;
     let solid = dimension == D as i32;
     let place = |tag: u64| mesh.nodes.get(&tag).map_or_else(Vector3::zeros, |x| Vector3::from(*x));
-    let mut faces = Vec::new();
+    let mut faces: Vec<Face> = Vec::new();
     for block in blocks {
         for nodes in block.nodes.chunks_exact(block.size) {
-            let own =
-                faces_of(block.kind, D).iter().map(|face| face.map(|i| nodes.get(i).copied().unwrap_or_default()));
-            let own: Vec<Face> = own.collect();
+            let first = faces.len();
+            faces.extend(faces_of(block.kind, D).iter().map(|face| face.map(|i| nodes[i])));
             // Elements may be turned inside out.
-            let turned = solid && measure::<D>(&own, place) < 0.0;
-            faces.extend(own.into_iter().map(|[a, b, c, d]| if turned { [d, c, b, a] } else { [a, b, c, d] }));
+            if solid && measure::<D>(&faces[first..], place) < 0.0 {
+                faces[first..].iter_mut().for_each(|face| face.reverse());
+            }
         }
     }
-    let simplices = simplices::<D>(if solid { boundary(faces) } else { faces });
-    // Numbers in the order of the tags.
-    let mut numbers: BTreeMap<u64, u32> = simplices.iter().flatten().map(|&tag| (tag, 0)).collect();
-    numbers.values_mut().zip(0..).for_each(|(number, next)| *number = next);
-    let simplices: Vec<[u32; D]> =
-        simplices.iter().map(|simplex| simplex.map(|tag| numbers.get(&tag).copied().unwrap_or_default())).collect();
-    let places: Vec<_> = numbers.keys().map(|&tag| place(tag)).collect();
+    let simplices: Vec<[u64; D]> = simplices(if solid { boundary(faces) } else { faces });
+    // Vertices have numbers in the order of their tags.
+    let mut tags: Vec<u64> = simplices.iter().flatten().copied().collect();
+    tags.sort_unstable();
+    tags.dedup();
+    let number = |tag: u64| tags.partition_point(|&other| other < tag) as u32;
+    let simplices: Vec<[u32; D]> = simplices.iter().map(|simplex| simplex.map(number)).collect();
     let wrong = |why: String| FileError(format!("holds the group {group:?} with {why}"));
-    let first = places.first().copied().unwrap_or_default();
-    if let Some(x) = places.iter().find(|x| D == 2 && (x[2] - first[2]).abs() > FLAT * x.amax().max(first.amax())) {
-        return Err(wrong(format!("a node at {:?}, off the plane z = {}, in 2 dimensions", x.as_slice(), first[2])));
+    let heights = || tags.iter().map(|&tag| place(tag)[2]);
+    let [low, high] = [heights().fold(f64::INFINITY, f64::min), heights().fold(f64::NEG_INFINITY, f64::max)];
+    let size = tags.iter().map(|&tag| place(tag).amax()).fold(0.0, f64::max);
+    if D == 2 && high - low > FLAT * size {
+        return Err(wrong(format!("nodes from z = {low} to {high}; in 2 dimensions it must lie in a plane")));
     }
-    let vertices: Vec<Vector<f64, D>> = places.iter().map(|x| Vector::from_fn(|k, _| x[k])).collect();
-    if !solid {
-        return Sheet::new(&vertices, &simplices).map(Shape::from).ok_or_else(|| wrong("no element".to_owned()));
-    }
-    if D == 2 { polygon(&vertices, &simplices) } else { surface(vertices, &simplices) }.map_err(wrong)
+    let vertices: Vec<Vector<f64, D>> = tags.iter().map(|&tag| Vector::from_fn(|k, _| place(tag)[k])).collect();
+    let shape = if !solid {
+        Sheet::new(&vertices, &simplices).map(Shape::from).ok_or_else(|| "no element with an extent".to_owned())
+    } else if D == 2 {
+        polygon(&vertices, &simplices)
+    } else {
+        let triangles = simplices.iter().map(|corners| std::array::from_fn(|k| corners[k])).collect();
+        Surface::new(vertices, triangles).map(Shape::from).map_err(|error| error.to_string())
+    };
+    shape.map_err(wrong)
 }
 
 /// The nodes of a face of an element in order around it, the last one repeated if there are fewer than four.
@@ -174,7 +167,7 @@ fn measure<const D: usize>(faces: &[Face], place: impl Fn(u64) -> Vector3<f64>) 
     let Some(origin) = faces.first().map(|face| place(face[0])) else { return 0.0 };
     let of_face = |face: &Face| {
         let [a, b, c, d] = face.map(|tag| place(tag) - origin);
-        if D == 2 { a[0] * d[1] - a[1] * d[0] } else { a.cross(&b).dot(&c) + a.cross(&c).dot(&d) }
+        if D == 2 { a.cross(&d)[2] } else { a.cross(&b).dot(&c) + a.cross(&c).dot(&d) }
     };
     faces.iter().map(of_face).sum()
 }
@@ -196,48 +189,43 @@ fn boundary(faces: Vec<Face>) -> Vec<Face> {
 
 /// The segments or triangles of faces. A quadrilateral is cut from its lowest tag, so that it has the same triangles seen from both sides.
 fn simplices<const D: usize>(faces: Vec<Face>) -> Vec<[u64; D]> {
-    let halves = |mut face: Face| {
+    let mut simplices = Vec::new();
+    for mut face in faces {
         let lowest = (0..4).min_by_key(|&i| face[i]).unwrap_or_default();
         face.rotate_left(if D == 2 { 0 } else { lowest });
         let [a, b, c, d] = face;
-        let halves = if D == 2 { [[a, d, d], [a, a, a]] } else { [[a, b, c], [a, c, d]] };
-        halves.into_iter().filter(|[a, b, c]| a != b && c != a && (b != c || D == 2))
-    };
-    faces.into_iter().flat_map(halves).map(|corners| std::array::from_fn(|k| corners[k])).collect()
-}
-
-/// The solid inside triangles.
-fn surface<const D: usize>(vertices: Vec<Vector<f64, D>>, triangles: &[[u32; D]]) -> Result<Shape<D>, String> {
-    let triangles = triangles.iter().map(|corners| [corners[0], corners[1], corners[D - 1]]).collect();
-    Ok(Surface::new(vertices, triangles).map_err(|error| error.to_string())?.into())
+        let triangles = if D == 2 { [[a, d, d], [a; 3]] } else { [[a, b, c], [a, c, d]] };
+        let simplex = |corners: [u64; 3]| std::array::from_fn(|k| corners[k]);
+        let has_extent = |corners: &[u64; D]| (0..D).all(|k| corners[k] != corners[(k + 1) % D]);
+        simplices.extend(triangles.map(simplex).into_iter().filter(has_extent));
+    }
+    simplices
 }
 
 /// The polygon inside edges, each with the inside at the left.
 fn polygon<const D: usize>(vertices: &[Vector<f64, D>], edges: &[[u32; D]]) -> Result<Shape<D>, String> {
     if edges.len() > MAX_EDGES {
-        return Err(format!(
-            "{} edges around it; at most {MAX_EDGES} are allowed: mesh its outline coarser",
-            edges.len()
-        ));
+        return Err(format!("{} edges around it; at most {MAX_EDGES} are allowed", edges.len()));
     }
-    let at = |i: u32| vertices.get(i as usize).map_or(&[][..], |x| x.as_slice());
+    let at = |i: u32| vertices.get(i as usize).copied().unwrap_or_else(Vector::zeros);
+    let place = |i: u32| format!("at {:?}", at(i).as_slice());
     let mut next = BTreeMap::new();
     for edge in edges {
         if next.insert(edge[0], edge[1]).is_some() {
-            return Err(format!("an outline that meets itself at {:?}", at(edge[0])));
+            return Err(format!("an outline that meets itself {}", place(edge[0])));
         }
     }
-    let (mut outlines, mut places) = (Vec::new(), Vec::new());
+    let mut outlines = Vec::new();
     while let Some((first, mut end)) = next.pop_first() {
-        let mut outline = vec![first];
+        let mut outline = vec![at(first)];
         while end != first {
-            outline.push(end);
-            end = next.remove(&end).ok_or_else(|| format!("an outline that does not go on at {:?}", at(end)))?;
+            outline.push(at(end));
+            end = next.remove(&end).ok_or_else(|| format!("an outline that does not go on {}", place(end)))?;
         }
-        places.extend(outline.iter().copied());
-        outlines.push(outline.iter().filter_map(|&i| vertices.get(i as usize).copied()).collect());
+        outlines.push(outline);
     }
-    let place = |vertex: usize| places.get(vertex).map_or(String::new(), |&i| format!(" at {:?}", at(i)));
+    let place =
+        |vertex: usize| outlines.concat().get(vertex).map_or(String::new(), |x| format!(", at {:?}", x.as_slice()));
     let wrong = |error: PolygonError| format!("{error}{}", error.vertex().map_or(String::new(), place));
     Ok(Polygon::of_outlines(&outlines).map_err(wrong)?.into())
 }

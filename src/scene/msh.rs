@@ -1,15 +1,15 @@
 //! Meshes of Gmsh: files in the format MSH 4.1, as text and binary.
 //!
-//! Nothing is allocated for a number that is announced and not there: each entry takes bytes of the file.
+//! No room is made for entries that are announced: each entry that is kept has taken bytes of the file.
 
 use super::file::FileError;
 use crate::problems::LARGEST;
-use memchr::memmem;
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use memchr::{memchr_iter, memmem};
+use std::collections::{BTreeMap, HashMap};
 use std::fmt::Display;
 use std::str::FromStr;
 
-/// The dimension and the number of nodes of the elements of first order, by their type.
+/// The elements of first order: the number of Gmsh for the type, the dimension and the number of nodes.
 const ELEMENTS: [(i32, i32, usize); 8] =
     [(15, 0, 1), (1, 1, 2), (2, 2, 3), (3, 2, 4), (4, 3, 4), (5, 3, 8), (6, 3, 6), (7, 3, 5)];
 
@@ -23,7 +23,7 @@ const NAMED: usize = 10;
 #[derive(Default)]
 pub(super) struct Mesh {
     names: BTreeMap<(i32, i32), String>,
-    /// The tags of the groups that each entity belongs to.
+    /// The tags of the groups of each entity.
     groups: HashMap<(i32, i32), Vec<i32>>,
     /// The positions of the nodes by their tags.
     pub nodes: HashMap<u64, [f64; 3]>,
@@ -48,8 +48,8 @@ impl Mesh {
         file.format()?;
         loop {
             let section = file.line();
-            // Binary numbers begin right behind the line.
-            file.at += 1;
+            // Binary numbers begin behind the end of the line.
+            file.at += usize::from(file.binary);
             match section.as_str() {
                 "" => return Ok(mesh),
                 "$PhysicalNames" => mesh.read_names(&mut file)?,
@@ -59,49 +59,33 @@ impl Mesh {
                 "$PartitionedEntities" => {
                     return Err(file.wrong("a partitioned mesh; save it before it is partitioned"));
                 }
-                _ if section.starts_with('$') => file.skip(&section)?,
-                _ => return Err(file.wrong(format!("{:?} instead of a section such as $Nodes", shown(&section)))),
+                _ => file.skip(&section)?,
             }
             file.end(&section)?;
         }
     }
 
-    /// The dimension and the elements of the physical group with this name, or with this tag if it has no name. It must have `dimension`
+    /// The dimension and the elements of the physical group with this name, or with this tag if it has no name. The group has `dimension`
     /// dimensions, or one less.
     pub(super) fn group(&self, name: &str, dimension: i32) -> Result<(i32, Vec<&Block>), FileError> {
-        let of_entity =
-            |(entity, tags): (&(i32, i32), &Vec<i32>)| tags.iter().map(|&tag| (entity.0, tag)).collect::<Vec<_>>();
-        let all: BTreeSet<(i32, i32)> =
-            self.names.keys().copied().chain(self.groups.iter().flat_map(of_entity)).collect();
-        let named = |group: &(i32, i32)| self.names.get(group).cloned().unwrap_or_else(|| group.1.to_string());
-        let known = all.iter().filter(|group| (dimension - 1..=dimension).contains(&group.0));
-        let found: Vec<_> = known.clone().filter(|group| named(group) == name).collect();
-        let &[&(of, tag)] = found.as_slice() else {
-            let kind = |of: i32| ["point", "curve", "surface", "volume"].get(of as usize).copied().unwrap_or("thing");
-            if !found.is_empty() {
-                let what = format!(
-                    "has several physical groups {name:?}, a {} and a {}",
-                    kind(dimension - 1),
-                    kind(dimension)
-                );
-                return Err(FileError(format!("{what}; give each a name of its own")));
-            }
-            let list: Vec<_> =
-                known.take(NAMED).map(|group| format!("{:?} ({})", shown(&named(group)), kind(group.0))).collect();
-            let list = if list.is_empty() { "none of this kind".to_owned() } else { list.join(", ") };
-            let kinds = format!("{} or {}", kind(dimension), kind(dimension - 1));
-            return Err(FileError(format!("has no physical {kinds} {:?}; its groups are: {list}", shown(name))));
-        };
-        let is_own = |block: &&Block| {
-            block.entity.0 == of && self.groups.get(&block.entity).is_some_and(|groups| groups.contains(&tag))
-        };
-        let blocks: Vec<_> = self.blocks.iter().filter(is_own).collect();
-        if blocks.iter().all(|block| block.nodes.is_empty()) {
+        let of_entities = self.groups.iter().flat_map(|(entity, tags)| tags.iter().map(|&tag| (entity.0, tag)));
+        let mut known: BTreeMap<_, _> = of_entities.map(|group| (group, group.1.to_string())).collect();
+        known.extend(self.names.clone());
+        known.retain(|group, _| (dimension - 1..=dimension).contains(&group.0));
+        let found: Vec<_> = known.iter().filter(|(_, known)| *known == name).map(|(group, _)| *group).collect();
+        let [(of, tag)] = found[..] else {
+            let kinds = if dimension == 2 { "surface or curve" } else { "volume or surface" };
+            let (count, known) = (found.len(), known.values().take(NAMED).map(|name| shown(name)).collect::<Vec<_>>());
+            let name = shown(name);
             return Err(FileError(format!(
-                "has no elements in the group {name:?}; mesh all of the part before saving it"
+                "has {count} physical groups {name:?}; must be the name of one {kinds}: {known:?}"
             )));
-        }
-        Ok((of, blocks))
+        };
+        let is_own = |entity: &(i32, i32)| self.groups.get(entity).is_some_and(|groups| groups.contains(&tag));
+        let blocks = self.blocks.iter().filter(|block| block.entity.0 == of && is_own(&block.entity));
+        let blocks: Vec<_> = blocks.filter(|block| !block.nodes.is_empty()).collect();
+        let empty = || FileError(format!("has no elements in the group {name:?}; mesh the part before saving it"));
+        if blocks.is_empty() { Err(empty()) } else { Ok((of, blocks)) }
     }
 
     /// Reads the names of groups, which are text in binary files, too.
@@ -126,12 +110,11 @@ impl Mesh {
                 for _ in 0..if dimension == 0 { 3 } else { 6 } {
                     file.real("the box around an entity")?;
                 }
-                // A group that turns an entity around has it with a negative tag.
                 let count = file.size("the number of groups of an entity")?;
+                // An entity that a group turns around has the group's tag with a minus.
                 let groups = (0..count).map(|_| file.int("the tag of a group").map(i32::saturating_abs));
                 self.groups.insert((dimension, tag), groups.collect::<Result<_, _>>()?);
-                let sides = if dimension == 0 { 0 } else { file.size("the number of sides of an entity")? };
-                for _ in 0..sides {
+                for _ in 0..if dimension == 0 { 0 } else { file.size("the number of sides of an entity")? } {
                     file.int("the tag of a side")?;
                 }
             }
@@ -142,62 +125,48 @@ impl Mesh {
     fn read_nodes(&mut self, file: &mut Reader) -> Result<(), FileError> {
         let [blocks, all] = file.counts()?;
         for _ in 0..blocks {
-            let dimension = file.int("the dimension of an entity")?;
-            file.int("the tag of an entity")?;
-            let parametric = file.int("0, or 1 for parametric nodes")? != 0;
-            let count = file.size("the number of nodes in a block")?;
+            let (dimension, _) = file.entity()?;
+            // The parameters of a node on its entity stand behind its coordinates.
+            let parameters = if file.int("0 or 1")? == 0 { 0 } else { dimension.clamp(0, 3) };
+            let count = file.size("the number of nodes of a block")?;
             let tags = (0..count).map(|_| file.size("the tag of a node")).collect::<Result<Vec<_>, _>>()?;
             for tag in tags {
-                let mut x = [0.0; 3];
-                for x in &mut x {
-                    *x = file.real("a coordinate of a node")?;
-                }
-                // The parameters of the node on its entity.
-                for _ in 0..if parametric { dimension.clamp(0, 3) } else { 0 } {
-                    file.real("a parameter of a node")?;
-                }
-                if !x.iter().all(|x| x.abs() <= LARGEST) {
-                    return Err(
-                        file.wrong(format!("node {tag} at {x:?}; coordinates must be finite, up to {LARGEST:e}"))
-                    );
-                }
-                if self.nodes.insert(tag, x).is_some() {
-                    return Err(file.wrong(format!("node {tag} for the second time")));
-                }
+                let [x, y, z] = [0; 3].map(|_| file.real("a coordinate of a node"));
+                let x = [x?, y?, z?];
+                (0..parameters).try_for_each(|_| file.real("a parameter of a node").map(drop))?;
+                let allowed = x.iter().all(|x| x.abs() <= LARGEST);
+                file.require(allowed, format_args!("node {tag} at {x:?}; must be finite and at most {LARGEST:e}"))?;
+                file.require(self.nodes.insert(tag, x).is_none(), format_args!("node {tag} for the second time"))?;
             }
         }
-        file.has_all(self.nodes.len() as u64, all, "nodes")
+        let found = self.nodes.len();
+        file.require(found as u64 == all, format_args!("{found} nodes where {all} are announced"))
     }
 
     fn read_elements(&mut self, file: &mut Reader) -> Result<(), FileError> {
-        let [blocks, all] = file.counts()?;
-        let mut found: u64 = 0;
+        let ([blocks, all], mut found) = (file.counts()?, 0);
         for _ in 0..blocks {
-            let entity = (file.int("the dimension of an entity")?, file.int("the tag of an entity")?);
-            let kind = file.int("the type of elements")?;
+            let (entity, kind) = (file.entity()?, file.int("the type of elements")?);
             let Some(&(_, dimension, size)) = ELEMENTS.iter().find(|(own, ..)| *own == kind) else {
-                let what = "must be of first order: mesh with `Mesh.ElementOrder = 1`, or `gmsh -order 1`";
-                return Err(file.wrong(format!("elements of type {kind}; elements {what}")));
+                let order = "elements must be of first order: `Mesh.ElementOrder = 1`, or `gmsh -order 1`";
+                return Err(file.wrong(format!("elements of type {kind}; {order}")));
             };
-            if dimension != entity.0 {
-                let what = format!("elements of type {kind}, which have dimension {dimension}");
-                return Err(file.wrong(format!("{what}, in an entity of dimension {}", entity.0)));
-            }
+            let (is_own, of) = (dimension == entity.0, entity.0);
+            file.require(is_own, format_args!("elements of {dimension} dimensions in an entity of {of}"))?;
             let mut nodes = Vec::new();
-            for _ in 0..file.size("the number of elements in a block")? {
+            for _ in 0..file.size("the number of elements of a block")? {
                 let tag = file.size("the tag of an element")?;
                 for _ in 0..size {
                     let node = file.size("a node of an element")?;
-                    if !self.nodes.contains_key(&node) {
-                        return Err(file.wrong(format!("element {tag} with node {node}, which is not in $Nodes")));
-                    }
+                    let exists = self.nodes.contains_key(&node);
+                    file.require(exists, format_args!("element {tag} with node {node}, which is not in $Nodes"))?;
                     nodes.push(node);
                 }
                 found += 1;
             }
             self.blocks.push(Block { entity, kind, size, nodes });
         }
-        file.has_all(found, all, "elements")
+        file.require(found == all, format_args!("{found} elements where {all} are announced"))
     }
 }
 
@@ -206,7 +175,7 @@ fn shown(text: &str) -> String {
     text.chars().take(SHOWN).collect()
 }
 
-/// The bytes of a file, and the position up to which they have been read.
+/// The bytes of a file, and up to where they have been read.
 struct Reader<'a> {
     bytes: &'a [u8],
     at: usize,
@@ -214,27 +183,27 @@ struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    /// What is wrong where the file has been read up to.
-    fn wrong(&self, what: impl Display) -> FileError {
+    /// What is wrong where the reader is.
+    fn wrong(&self, found: impl Display) -> FileError {
         let before = &self.bytes[..self.at.min(self.bytes.len())];
-        let line = || 1 + memchr::memchr_iter(b'\n', before).count();
-        let place = if self.binary { format!("before byte {}", before.len()) } else { format!("in line {}", line()) };
-        FileError(format!("has, {place}, {what}"))
+        let line = 1 + memchr_iter(b'\n', before).count();
+        let place = if self.binary { format!("before byte {}", before.len()) } else { format!("in line {line}") };
+        FileError(format!("has, {place}, {found}"))
     }
 
-    /// The rest of the file, with or without the blanks at its beginning.
-    fn rest(&mut self, blanks: bool) -> &'a [u8] {
-        let rest = self.bytes.get(self.at..).unwrap_or_default();
-        let rest = if blanks { rest } else { rest.trim_ascii_start() };
-        self.at = self.bytes.len() - rest.len();
-        rest
+    fn require(&self, allowed: bool, found: impl Display) -> Result<(), FileError> {
+        if allowed { Ok(()) } else { Err(self.wrong(found)) }
     }
 
-    /// The text up to the next byte of the kind `ends`.
+    fn rest(&self) -> &'a [u8] {
+        self.bytes.get(self.at..).unwrap_or_default()
+    }
+
+    /// The text up to the next byte of the kind `ends`, without blanks around it.
     fn text(&mut self, ends: fn(&u8) -> bool) -> String {
-        let rest = self.rest(false);
+        let rest = self.rest().trim_ascii_start();
         let text = rest.split(ends).next().unwrap_or_default();
-        self.at += text.len();
+        self.at = self.bytes.len() - rest.len() + text.len();
         String::from_utf8_lossy(text).trim().to_owned()
     }
 
@@ -243,15 +212,19 @@ impl<'a> Reader<'a> {
         self.text(|byte| *byte == b'\n')
     }
 
+    fn word(&mut self) -> String {
+        self.text(u8::is_ascii_whitespace)
+    }
+
     /// The next number: N bytes, or a word.
     fn number<T: FromStr, const N: usize>(&mut self, what: &str, of: fn([u8; N]) -> T) -> Result<T, FileError> {
         if self.binary {
-            let bytes = self.rest(true).first_chunk();
+            let bytes = self.rest().first_chunk();
             self.at += N;
-            return bytes.map(|bytes| of(*bytes)).ok_or_else(|| self.wrong(format!("its end instead of {what}")));
+            return bytes.map(|bytes| of(*bytes)).ok_or_else(|| self.wrong(format_args!("its end instead of {what}")));
         }
-        let word = self.text(u8::is_ascii_whitespace);
-        word.parse().map_err(|_| self.wrong(format!("{:?} instead of {what}", shown(&word))))
+        let word = self.word();
+        word.parse().map_err(|_| self.wrong(format_args!("{:?} instead of {what}", shown(&word))))
     }
 
     fn int(&mut self, what: &str) -> Result<i32, FileError> {
@@ -266,54 +239,47 @@ impl<'a> Reader<'a> {
         self.number(what, f64::from_le_bytes)
     }
 
-    /// The numbers of blocks and of entries in a section.
-    fn counts(&mut self) -> Result<[u64; 2], FileError> {
-        let counts = [self.size("the number of blocks")?, self.size("the number of entries")?];
-        self.size("the lowest tag")?;
-        self.size("the highest tag")?;
-        Ok(counts)
+    /// The dimension and the tag of an entity.
+    fn entity(&mut self) -> Result<(i32, i32), FileError> {
+        Ok((self.int("the dimension of an entity")?, self.int("the tag of an entity")?))
     }
 
-    fn has_all(&self, found: u64, announced: u64, what: &str) -> Result<(), FileError> {
-        let all = found == announced;
-        if all { Ok(()) } else { Err(self.wrong(format!("{found} {what}, where {announced} are announced"))) }
+    /// The number of blocks and of entries in a section, with the lowest and highest tag behind them.
+    fn counts(&mut self) -> Result<[u64; 2], FileError> {
+        let [blocks, all, lowest, highest] = [0; 4].map(|_| self.size("the number of blocks, of entries, or a tag"));
+        lowest.and(highest)?;
+        Ok([blocks?, all?])
     }
 
     /// Reads the end of a section.
     fn end(&mut self, section: &str) -> Result<(), FileError> {
         let (line, end) = (self.line(), section.replacen('$', "$End", 1));
-        if line == end { Ok(()) } else { Err(self.wrong(format!("{:?} instead of {end}", shown(&line)))) }
+        self.require(line == end, format_args!("{:?} instead of {end}", shown(&line)))
     }
 
     /// Goes to the end of a section that is not needed.
     fn skip(&mut self, section: &str) -> Result<(), FileError> {
-        let end = section.replacen('$', "\n$End", 1);
-        // The section may be empty.
-        self.at -= 1;
-        let length = memmem::find(self.rest(true), end.as_bytes());
-        self.at += length.ok_or_else(|| self.wrong(format!("{:?} without its end", shown(section))))?;
+        self.require(section.starts_with('$'), format_args!("{:?} instead of a section", shown(section)))?;
+        let end = memmem::find(self.rest(), section.replacen('$', "$End", 1).as_bytes());
+        self.at += end.ok_or_else(|| self.wrong(format_args!("{:?} without its end", shown(section))))?;
         Ok(())
     }
 
     /// Reads the first section.
     fn format(&mut self) -> Result<(), FileError> {
         let section = self.line();
-        if section != "$MeshFormat" {
-            return Err(FileError("is no file of Gmsh, which begins with $MeshFormat".to_owned()));
-        }
-        let [version, mode, size] = [0; 3].map(|_| self.text(u8::is_ascii_whitespace));
-        if version != "4.1" {
-            let what = "4.1 is read: save with `Mesh.MshFileVersion = 4.1`, or `gmsh -format msh41`";
-            return Err(self.wrong(format!("the format MSH {:?}; {what}", shown(&version))));
-        }
-        if !["0", "1"].contains(&mode.as_str()) || size != "8" {
-            return Err(self.wrong("another type of file or size of numbers than 0 or 1, and 8"));
-        }
-        if mode == "1" {
-            (self.binary, self.at) = (true, self.at + 1);
-            if self.int("the number 1")? != 1 {
-                return Err(self.wrong("numbers whose bytes are in another order; save as text, `Mesh.Binary = 0`"));
-            }
+        self.require(section == "$MeshFormat", "another beginning than $MeshFormat: it is no mesh of Gmsh")?;
+        let [version, mode, size] = [0; 3].map(|_| self.word());
+        let allowed = "must be 4.1: save it with `Mesh.MshFileVersion = 4.1`, or `gmsh -format msh41`";
+        self.require(version == "4.1", format_args!("the version {:?} of MSH; {allowed}", shown(&version)))?;
+        let allowed = ["0", "1"].contains(&mode.as_str()) && size == "8";
+        self.require(allowed, "another type of file than 0 or 1, or another size of numbers than 8")?;
+        self.binary = mode == "1";
+        if self.binary {
+            self.at += 1;
+            let order = "numbers in another order of bytes; save it as text, `Mesh.Binary = 0`";
+            let is_one = self.int("the number 1")? == 1;
+            self.require(is_one, order)?;
         }
         self.end(&section)
     }

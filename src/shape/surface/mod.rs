@@ -157,11 +157,13 @@ impl<const D: usize> Solid<D> for Surface<D> {
 
     /// The triangles, clipped to the box.
     fn facets(&self, of: &GridBox<D>, planes: &[Face<D>]) -> Option<Vec<Facet<D>>> {
-        let (mesh, half) = (&self.mesh, space(&of.edges) * 0.5);
-        let center = space(&of.lower) + half;
+        let (mesh, half, round_off) = (&self.mesh, space(&of.edges) * 0.5, of.round_off());
+        let (center, reach) = (space(&of.lower) + half, half.add_scalar(round_off));
+        // A corner lies in a face of this box if it does so in the box beyond, whatever round-off: no triangle is left to neither.
+        let snapped = |x: f64, half: f64| if (x.abs() - half).abs() <= round_off { half.copysign(x) } else { x };
         let mut facets = Vec::new();
-        for i in mesh.meeting(&Bounds(center - half, center + half)) {
-            let corners = mesh.corners(i).map(|corner| corner - center).to_vec();
+        for i in mesh.meeting(&Bounds(center - reach, center + reach)) {
+            let corners = mesh.corners(i).map(|corner| (corner - center).zip_map(&half, snapped)).to_vec();
             // A triangle in a face of the box belongs to the box on the inner side of that triangle.
             let outside = |k: usize, sign: f64| {
                 sign * mesh.normals[i][k] < 0.0 && corners.iter().all(|corner| sign * corner[k] >= half[k])

@@ -10,4 +10,4 @@ Physical Volume("rubber") = {4};
 Physical Surface("foot") = Surface In BoundingBox {0.9, 0.9, 0.9, 3.1, 2.1, 1.1};
 Physical Surface("hole") = Surface In BoundingBox {1.2, 0.9, 1.05, 1.6, 2.1, 1.45};
 Physical Surface("top of steel") = Surface In BoundingBox {0.9, 0.9, 1.4, 2.2, 2.1, 1.6};
-Mesh.MeshSizeMax = 0.4;
+Mesh.MeshSizeMax = 0.7;
