@@ -9,7 +9,8 @@ use std::path::{Path, PathBuf};
 
 type Failure = Box<dyn std::error::Error>;
 
-fn folder() -> PathBuf {
+/// The folder of the meshes.
+pub fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/suite/meshes")
 }
 
@@ -187,15 +188,15 @@ fn a_wrong_use_of_a_group_is_refused_with_its_key() -> Result<(), Failure> {
         ("/bodies/0/shape", mesh("none.msh", "steel"), "bodies[0].shape.mesh.file: ", "No such file"),
         (
             "/bodies/0/shape",
-            json!({"union": [mesh("part.msh", "foot")]}),
+            json!({"union": [mesh("part.msh", "hole")]}),
             "bodies[0].shape.union[0].mesh.file: ",
-            "has 0 physical groups \"foot\"",
+            "in 2 dimensions all must have one z",
         ),
         (
             "/bodies/0/shape",
-            mesh("part.msh", "foot"),
+            mesh("part.msh", "steel"),
             "bodies[0].shape.mesh.file: ",
-            "must be the name of one surface or curve",
+            "one surface or curve: [\"foot\"",
         ),
     ];
     for (key, value, place, words) in wrong {
@@ -284,7 +285,10 @@ fn broken_files_are_refused_with_the_place() -> Result<(), Failure> {
         (with("\"part\"", "\"side"), "in line 7, \"\\\"side\" instead of a name in quotes"),
         (with("$Nodes", "$PartitionedEntities\n$EndPartitionedEntities\n$Nodes"), "in line 14, a partitioned mesh"),
         (with("$Nodes", "$Periodic\n1\n$Nodes"), "in line 14, \"$Periodic\" without its end"),
-        (with("1 1 0\n0", "1 1 0.5\n0"), "nodes from z = 0 to 0.5; in 2 dimensions it must lie in a plane"),
+        (
+            with("1 1 0\n0", "1 1 0.5\n0"),
+            "with nodes at [0.0, 0.0, 0.0] and [1.0, 1.0, 0.5]; in 2 dimensions all must have one z",
+        ),
         (with("3 1 3 4", "3 2 3 4"), "an outline that meets itself at [1.0, 1.0]"),
         (with("1 1 0\n0 1 0", "0 1 0\n1 1 0"), "an outline that meets itself at [0.0, 0.0]"),
         (

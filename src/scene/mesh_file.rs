@@ -1,12 +1,11 @@
 //! Physical groups of meshes of Gmsh as shapes.
 
 use super::file::{FileError, ending, open_mesh};
-use super::msh::Mesh;
+use super::msh::{Block, Mesh};
 use crate::problems::Problems;
 use crate::shape::{Polygon, PolygonError, Shape, Sheet, Surface};
 use crate::simulation::as_type;
-use crate::tensor::Vector;
-use nalgebra::Vector3;
+use crate::tensor::{Tensor, Vector, determinant};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -17,7 +16,7 @@ use std::sync::OnceLock;
 /// The most edges around a group in 2D: all pairs of edges are compared.
 const MAX_EDGES: usize = 20_000;
 
-/// The largest distance of a mesh in 2D from a plane, relative to its coordinates.
+/// The largest slope of a mesh in 2D.
 const FLAT: f64 = 1e-9;
 
 /// A physical group of a mesh of Gmsh.
@@ -105,35 +104,23 @@ pub fn read_group<const D: usize>(path: &Path, group: &str) -> Result<Shape<D>, 
     let mesh = Mesh::read(&bytes)?;
     let (dimension, blocks) = mesh.group(group, D as i32)?;
     let solid = dimension == D as i32;
-    let place = |tag: u64| mesh.nodes.get(&tag).map_or_else(Vector3::zeros, |x| Vector3::from(*x));
-    let mut faces: Vec<Face> = Vec::new();
-    for block in blocks {
-        for nodes in block.nodes.chunks_exact(block.size) {
-            let first = faces.len();
-            faces.extend(faces_of(block.kind, D).iter().map(|face| face.map(|i| nodes[i])));
-            // Elements may be turned inside out.
-            if solid && measure::<D>(&faces[first..], place) < 0.0 {
-                faces[first..].iter_mut().for_each(|face| face.reverse());
-            }
-        }
-    }
-    let simplices: Vec<[u64; D]> = simplices(if solid { boundary(faces) } else { faces });
+    let place = |tag: u64| mesh.nodes.get(&tag).copied().unwrap_or_default();
+    let simplices = simplices_of::<D>(&blocks, solid, place);
     // Vertices have numbers in the order of their tags.
-    let mut tags: Vec<u64> = simplices.iter().flatten().copied().collect();
+    let mut tags = simplices.concat();
     tags.sort_unstable();
     tags.dedup();
     let number = |tag: u64| tags.partition_point(|&other| other < tag) as u32;
     let simplices: Vec<[u32; D]> = simplices.iter().map(|simplex| simplex.map(number)).collect();
     let wrong = |why: String| FileError(format!("holds the group {group:?} with {why}"));
-    let heights = || tags.iter().map(|&tag| place(tag)[2]);
-    let [low, high] = [heights().fold(f64::INFINITY, f64::min), heights().fold(f64::NEG_INFINITY, f64::max)];
-    let size = tags.iter().map(|&tag| place(tag).amax()).fold(0.0, f64::max);
-    if D == 2 && high - low > FLAT * size {
-        return Err(wrong(format!("nodes from z = {low} to {high}; in 2 dimensions it must lie in a plane")));
+    let start = tags.first().map_or([0.0; 3], |&tag| place(tag));
+    let is_off = |x: &[f64; 3]| (x[2] - start[2]).abs() > FLAT * (x[0] - start[0]).hypot(x[1] - start[1]);
+    if let Some(x) = tags.iter().map(|&tag| place(tag)).find(|x| D == 2 && is_off(x)) {
+        return Err(wrong(format!("nodes at {start:?} and {x:?}; in 2 dimensions all must have one z")));
     }
     let vertices: Vec<Vector<f64, D>> = tags.iter().map(|&tag| Vector::from_fn(|k, _| place(tag)[k])).collect();
     let shape = if !solid {
-        Sheet::new(&vertices, &simplices).map(Shape::from).ok_or_else(|| "no element with an extent".to_owned())
+        Sheet::new(&vertices, &simplices).map(Shape::from).ok_or_else(|| "no element of different nodes".to_owned())
     } else if D == 2 {
         polygon(&vertices, &simplices)
     } else {
@@ -143,10 +130,27 @@ pub fn read_group<const D: usize>(path: &Path, group: &str) -> Result<Shape<D>, 
     shape.map_err(wrong)
 }
 
-/// The nodes of a face of an element in order around it, the last one repeated if there are fewer than four.
-type Face = [u64; 4];
+/// The simplices of D − 1 dimensions around a solid, or of all elements of a group without an inside.
+fn simplices_of<const D: usize>(blocks: &[&Block], solid: bool, place: impl Fn(u64) -> [f64; 3]) -> Vec<[u64; D]> {
+    let mut simplices: Vec<[u64; D]> = Vec::new();
+    for block in blocks {
+        for nodes in block.nodes.chunks_exact(block.size) {
+            let first = simplices.len();
+            faces_of(block.kind, D).iter().for_each(|face| add_simplices(face.map(|i| nodes[i]), &mut simplices));
+            // Elements may be turned inside out. D! V = Σ det (x₁ − o, …)
+            let origin = place(nodes[0]);
+            let edges = |simplex: &[u64; D]| Tensor::<f64, D>::from_fn(|i, k| place(simplex[k])[i] - origin[i]);
+            let volume: f64 = simplices[first..].iter().map(|simplex| determinant(&edges(simplex))).sum();
+            if solid && volume < 0.0 {
+                simplices[first..].iter_mut().for_each(|simplex| simplex.swap(0, 1));
+            }
+        }
+    }
+    if solid { boundary(simplices) } else { simplices }
+}
 
-/// The faces of D − 1 dimensions of an element of this type, seen from outside: the element itself if it has D − 1 dimensions.
+/// The faces of D − 1 dimensions of an element of this type, counter-clockwise as seen from outside, the last node repeated if there are fewer than
+/// four. An element of D − 1 dimensions has itself.
 fn faces_of(kind: i32, dimension: usize) -> &'static [[usize; 4]] {
     match (dimension, kind) {
         (2, 1) => &[[0, 1, 1, 1]],
@@ -162,44 +166,27 @@ fn faces_of(kind: i32, dimension: usize) -> &'static [[usize; 4]] {
     }
 }
 
-/// A multiple of the area (2D) or volume of an element, by its faces.
-fn measure<const D: usize>(faces: &[Face], place: impl Fn(u64) -> Vector3<f64>) -> f64 {
-    let Some(origin) = faces.first().map(|face| place(face[0])) else { return 0.0 };
-    let of_face = |face: &Face| {
-        let [a, b, c, d] = face.map(|tag| place(tag) - origin);
-        if D == 2 { a.cross(&d)[2] } else { a.cross(&b).dot(&c) + a.cross(&c).dot(&d) }
-    };
-    faces.iter().map(of_face).sum()
+/// Adds the segment, the triangle or the two triangles of a face. A quadrilateral is cut from its lowest tag, so that it has the same triangles
+/// seen from both sides.
+fn add_simplices<const D: usize>(mut face: [u64; 4], simplices: &mut Vec<[u64; D]>) {
+    let lowest = (0..4).min_by_key(|&i| face[i]).filter(|_| D == 3);
+    face.rotate_left(lowest.unwrap_or(0));
+    let halves = [[0, 1, 2], [0, 2, 3]].map(|corners| std::array::from_fn(|k| face[corners[k]]));
+    let has_extent = |simplex: &[u64; D]| (0..D).all(|k| simplex[k] != simplex[(k + 1) % D]);
+    simplices.extend(halves.into_iter().take(D - 1).filter(has_extent));
 }
 
-/// The faces that belong to one element only.
-fn boundary(faces: Vec<Face>) -> Vec<Face> {
+/// The simplices that belong to one element only.
+fn boundary<const D: usize>(simplices: Vec<[u64; D]>) -> Vec<[u64; D]> {
     let mut alone = BTreeMap::new();
-    for face in faces {
-        // The nodes without repetitions, in the order of their tags.
-        let mut nodes = face.to_vec();
-        nodes.sort_unstable();
-        nodes.dedup();
-        if alone.remove(&nodes).is_none() {
-            alone.insert(nodes, face);
+    for simplex in simplices {
+        let mut tags = simplex;
+        tags.sort_unstable();
+        if alone.remove(&tags).is_none() {
+            alone.insert(tags, simplex);
         }
     }
     alone.into_values().collect()
-}
-
-/// The segments or triangles of faces. A quadrilateral is cut from its lowest tag, so that it has the same triangles seen from both sides.
-fn simplices<const D: usize>(faces: Vec<Face>) -> Vec<[u64; D]> {
-    let mut simplices = Vec::new();
-    for mut face in faces {
-        let lowest = (0..4).min_by_key(|&i| face[i]).unwrap_or_default();
-        face.rotate_left(if D == 2 { 0 } else { lowest });
-        let [a, b, c, d] = face;
-        let triangles = if D == 2 { [[a, d, d], [a; 3]] } else { [[a, b, c], [a, c, d]] };
-        let simplex = |corners: [u64; 3]| std::array::from_fn(|k| corners[k]);
-        let has_extent = |corners: &[u64; D]| (0..D).all(|k| corners[k] != corners[(k + 1) % D]);
-        simplices.extend(triangles.map(simplex).into_iter().filter(has_extent));
-    }
-    simplices
 }
 
 /// The polygon inside edges, each with the inside at the left.
