@@ -138,7 +138,8 @@ impl Shape {
             (from - from.round()).abs() <= EDGE && to - from <= EDGE
         };
         if self.has_sheet() && !(0..D).any(in_plane) {
-            let what = "is a surface without an inside that does not lie in one plane of the grid, and so holds hardly any node; shift the mesh or the                         grid, give each plane an entry of its own, or take a physical group with an inside";
+            let what = "is a surface that does not lie in one plane of the grid, and so holds hardly any node: shift the mesh or the grid, give \
+                        each plane an entry of its own, or take a physical group with an inside";
             return Err(BuildError::at(path, what));
         }
         Ok(region)

@@ -1,13 +1,12 @@
 //! Meshes of Gmsh as bodies, loaded surfaces and held regions.
 
+use crate::support::Failure;
 use bfree::scene::{self, mesh_file::read_group};
 use bfree::shape::{GridBox, Shape};
 use bfree::simulation::Simulation;
 use bfree::tensor::Vector;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
-
-type Failure = Box<dyn std::error::Error>;
 
 /// The folder of the meshes.
 pub fn folder() -> PathBuf {
