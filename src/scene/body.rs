@@ -90,7 +90,7 @@ impl Body {
 /// Refuses a shape that is empty or whose finite part reaches beyond the box: that part would be lost silently. Only infinite shapes are
 /// clipped.
 fn check_inside(shape: &Shape, problems: &mut Problems, path: &str, grid: &GridBox) {
-    let bounds = shape.check(problems, path, grid.dimension());
+    let bounds = shape.check_solid(problems, path, grid.dimension());
     let (Some([min, max]), Some(cells)) = (bounds, grid.cells()) else { return };
     if min.iter().zip(&max).any(|(min, max)| max < min) {
         let allowed = "must hold something: its parts do not meet, or nothing is left of them";

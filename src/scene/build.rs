@@ -89,7 +89,7 @@ impl Scene {
     /// [`Self::build_within`], compiled where it is called.
     fn build_in_this_crate<const D: usize>(&self, folder: &Path, memory: u64) -> Result<Simulation<D>, BuildError> {
         let grid: Grid<D> = self.grid.build().ok_or_else(|| other_dimension(D))?;
-        self.shapes().iter().try_for_each(|(path, shape)| shape.read_files(path, folder))?;
+        self.shapes().iter().try_for_each(|(path, shape)| shape.read_files(path, folder, D))?;
         for (path, curve) in self.curves() {
             curve.read(folder).map_err(|error| BuildError::at(format!("{path}.file"), error))?;
         }
@@ -209,7 +209,7 @@ impl Scene {
         let Some(initial) = &self.initial_velocity else { return Ok(()) };
         let mut regions: Vec<(Shape<D>, Vector<f64, D>)> = Vec::new();
         for (i, node) in initial.nodes.iter().enumerate() {
-            let region = node.region.built(&format!("initial_velocity.nodes[{i}]"))?;
+            let region = node.region.of_nodes(&format!("initial_velocity.nodes[{i}].region"), &simulation.grid)?;
             regions.push((region, vector(&node.velocity)));
         }
         let spacing = simulation.grid.spacing;

@@ -49,7 +49,7 @@ impl<const D: usize> Builder<'_, D> {
             }
         }
         for (i, prescribed) in scene.prescribed.iter().enumerate() {
-            let region = prescribed.region.built(&format!("prescribed[{i}]"))?;
+            let region = prescribed.region.of_nodes(&format!("prescribed[{i}].region"), &self.grid)?;
             // A checked scene gives one motion, and a region has no normal.
             let motion = prescribed.given().first().map_or(&Face::Free, |(_, face)| face).motion(0)?;
             loads.prescribed.push(Prescribed { name: format!("region{i}"), on: Selection::Region(region), motion });

@@ -82,7 +82,7 @@ impl Obstacle {
         let printed = !self.name.contains(|c: char| c.is_control() || c == ',' || c == '"');
         let allowed = "must be of letters that can be printed, without commas and quotes";
         problems.require(printed, &name, format_args!("{:?}", self.name), allowed);
-        if let Some([min, max]) = self.shape.check(problems, &format!("{path}.shape"), dimension) {
+        if let Some([min, max]) = self.shape.check_solid(problems, &format!("{path}.shape"), dimension) {
             let empty = min.iter().zip(&max).any(|(min, max)| max < min);
             let allowed = "must hold something: its parts do not meet";
             problems.require(!empty, &format!("{path}.shape"), "an empty shape", allowed);

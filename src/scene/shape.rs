@@ -2,8 +2,10 @@
 
 use super::BuildError;
 use super::image_file::ImageFile;
+use super::mesh_file::MeshFile;
 use super::surface_file::SurfaceFile;
 use super::vector::{self, check_axis, corners, direction};
+use crate::grid::Grid;
 use crate::problems::{LARGEST, MOST, Problems};
 use crate::shape::{self, EDGE, PolygonError, rotation};
 use crate::tensor::{Tensor, Vector, identity};
@@ -98,6 +100,9 @@ pub enum Shape {
     /// surface of the pixels is a staircase. Pressures on the staircase have the right resultant; tractions act on an area that is larger
     /// than that of the smooth surface.
     Image(ImageFile),
+    /// A physical group of a mesh of Gmsh (2D and 3D). A physical volume (in 2D: surface) is a solid: the elements of the group. A physical
+    /// surface (in 2D: curve) has no inside; it is the region of a load, which acts exactly on it, and of nodes held on a plane of the grid.
+    Mesh(MeshFile),
 }
 
 impl Shape {
@@ -122,6 +127,29 @@ impl Shape {
     /// The geometry; an error for the key `path` if it has another dimension than `D`.
     pub(super) fn built<const D: usize>(&self, path: &str) -> Result<shape::Shape<D>, BuildError> {
         self.build().ok_or_else(|| BuildError::at(path, format!("does not fit {D} dimensions")))
+    }
+
+    /// The region of nodes, which lies in one plane of the grid if it has no inside: elsewhere, only nodes that lie in it by chance would be in it.
+    pub(super) fn of_nodes<const D: usize>(&self, path: &str, grid: &Grid<D>) -> Result<shape::Shape<D>, BuildError> {
+        let region = self.built(path)?;
+        let (min, max) = region.bounding_box();
+        let in_plane = |k: usize| {
+            let [from, to] = [min, max].map(|x| (x[k] - grid.origin[k]) / grid.spacing);
+            (from - from.round()).abs() <= EDGE && to - from <= EDGE
+        };
+        if self.has_sheet() && !(0..D).any(in_plane) {
+            let what = "is a surface that does not lie in one plane of the grid, and so holds hardly any node: shift the mesh or the grid, give \
+                        each plane an entry of its own, or take a physical group with an inside";
+            return Err(BuildError::at(path, what));
+        }
+        Ok(region)
+    }
+
+    /// The result of [`Self::check`] for a solid, which has an inside.
+    pub(super) fn check_solid(&self, problems: &mut Problems, path: &str, dimension: usize) -> Option<[Vec<f64>; 2]> {
+        let allowed = format!("must have an inside: a physical group of {dimension} dimensions");
+        problems.require(!self.has_sheet(), path, "a surface without an inside", allowed);
+        self.check(problems, path, dimension)
     }
 
     /// The corners of the bounding box; `None` if the shape is not allowed, with the reasons in `problems`, and while its file has not been
@@ -189,6 +217,7 @@ impl Shape {
             }
             Self::Surface(file) => surface(file, problems, &at("surface"))?.into(),
             Self::Image(file) => file.build(problems, &at("image"))?.into(),
+            Self::Mesh(file) => file.build(problems, &at("mesh"))?,
         })
     }
 
@@ -216,14 +245,20 @@ impl Shape {
         matches!(self, Self::Image(_)) || self.parts().iter().any(|(_, part)| part.has_pixels())
     }
 
-    /// Reads the files of the shape from `folder`.
-    pub(super) fn read_files(&self, path: &str, folder: &Path) -> Result<(), BuildError> {
+    /// Whether a surface without an inside is known to be part of the shape.
+    fn has_sheet(&self) -> bool {
+        matches!(self, Self::Mesh(mesh) if mesh.is_sheet()) || self.parts().iter().any(|(_, part)| part.has_sheet())
+    }
+
+    /// Reads the files of the shape from `folder`, for a scene of this dimension.
+    pub(super) fn read_files(&self, path: &str, folder: &Path, dimension: usize) -> Result<(), BuildError> {
         let (key, file, read) = match self {
             Self::Surface(surface) => ("surface", &surface.file, surface.read(folder)),
             Self::Image(image) => ("image", &image.file, image.read(folder)),
+            Self::Mesh(mesh) => ("mesh", &mesh.file, mesh.read(folder, dimension)),
             _ => {
                 let mut parts = self.parts().into_iter();
-                return parts.try_for_each(|(key, part)| part.read_files(&format!("{path}.{key}"), folder));
+                return parts.try_for_each(|(key, part)| part.read_files(&format!("{path}.{key}"), folder, dimension));
             }
         };
         let place = folder.join(file);

@@ -1,6 +1,6 @@
 //! Surfaces of triangles from files of STL and PLY.
 
-use super::file::{FileError, ending, open};
+use super::file::{FileError, ending, open_mesh};
 use crate::shape::{Surface, SurfaceError};
 use crate::tensor::Vector;
 use ply_rs_bw::parser::Parser;
@@ -12,9 +12,6 @@ use std::fs::File;
 use std::io::{self, BufReader};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
-
-/// Maximum length of a file in bytes.
-const MAX_BYTES: u64 = 1 << 30;
 
 /// A surface from a file.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
@@ -70,10 +67,7 @@ impl SurfaceFile {
 /// # Errors
 /// The file cannot be read, or its surface is open, faces both ways or crosses itself (with the position).
 pub fn read_file(path: &Path) -> Result<Surface<3>, FileError> {
-    let (mut file, length) = open(path)?;
-    if length > MAX_BYTES {
-        return Err(FileError(format!("has {length} bytes; at most {MAX_BYTES} are read")));
-    }
+    let mut file = open_mesh(path)?;
     let (corners, triangles): Triangles = match ending(path).as_str() {
         "stl" => {
             let mesh = stl_io::read_stl(&mut file)?;

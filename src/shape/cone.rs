@@ -55,7 +55,8 @@ impl<const D: usize> Cone<D> {
                 outline.push(Vector::from([s, 0.0]));
             }
         }
-        Some(Self { ends, radii, along, across: across / across.norm(), profile: Polygon::oriented(outline) })
+        let profile = Polygon::joined(&[outline]).oriented();
+        Some(Self { ends, radii, along, across: across / across.norm(), profile })
     }
 
     /// The position (s, ρ) of `x` in the section, and the unit vector away from the axis.

@@ -40,7 +40,7 @@ pub use pixels::{Mask, Pixels};
 pub use polygon::{Polygon, PolygonError};
 pub use seeds::Seed;
 pub use similar::{Similar, rotation};
-pub use surface::{Surface, SurfaceError};
+pub use surface::{Sheet, Surface, SurfaceError};
 
 use crate::tensor::Vector;
 
@@ -138,6 +138,8 @@ shapes! {
     Similar;
     /// The inside of a closed surface of triangles.
     Surface;
+    /// Triangles or segments that enclose nothing.
+    Sheet;
     /// Pixels of a picture, voxels of a scan.
     Pixels;
 }

@@ -6,11 +6,13 @@ use crate::tensor::Vector;
 /// Vertices and edges nearer to each other, relative to the size of the polygon, are taken to meet.
 const MEETING_DISTANCE: f64 = 1e-9;
 
-/// The inside of a closed outline of straight edges in 2D. The outline must not meet itself; it need not be convex.
+/// The inside of closed outlines of straight edges in 2D: mostly one, which need not be convex. Outlines must not meet themselves or each other.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Polygon<const D: usize> {
-    /// The vertices, counter-clockwise.
+    /// The vertices of all outlines, with the inside at the left.
     vertices: Vec<Vector<f64, D>>,
+    /// The vertices before and after each vertex.
+    beside: Vec<[usize; 2]>,
 }
 
 /// An outline that bounds no polygon. Vertices are counted from 0; edge i leads from vertex i to the next.
@@ -73,12 +75,24 @@ impl<const D: usize> Polygon<D> {
     /// # Errors
     /// The outline meets itself or bounds nothing. The error names the first such place.
     pub fn new(vertices: Vec<Vector<f64, D>>) -> Result<Self, PolygonError> {
-        let n = vertices.len();
+        Self::of_outlines(&[vertices])
+    }
+
+    /// The polygon inside several outlines: the inside at the left of all, or at the right of all. Vertices are counted through.
+    ///
+    /// # Errors
+    /// The errors of [`Self::new`].
+    pub(crate) fn of_outlines(outlines: &[Vec<Vector<f64, D>>]) -> Result<Self, PolygonError> {
         if D != 2 {
             return Err(PolygonError::Dimension(D));
         }
-        if n < 3 {
-            return Err(PolygonError::TooFew(n));
+        if let Some(few) = outlines.iter().find(|outline| outline.len() < 3) {
+            return Err(PolygonError::TooFew(few.len()));
+        }
+        let polygon = Self::joined(outlines);
+        let (vertices, n) = (&polygon.vertices, polygon.vertices.len());
+        if n == 0 {
+            return Err(PolygonError::TooFew(0));
         }
         let from_first = || vertices.iter().map(|x| x - vertices[0]);
         let further =
@@ -92,26 +106,38 @@ impl<const D: usize> Polygon<D> {
         if !from_first().any(|x| cross(&diameter, &x).abs() > tolerance * diameter.norm()) {
             return Err(PolygonError::Flat);
         }
-        let edge = |i: usize| [i, (i + 1) % n];
-        if let Some((i, k)) = pairs().find(|&(i, k)| meet(&vertices, edge(i), edge(k), tolerance)) {
+        let edge = |i: usize| [i, polygon.beside[i][1]];
+        if let Some((i, k)) = pairs().find(|&(i, k)| meet(vertices, edge(i), edge(k), tolerance)) {
             return Err(PolygonError::Meeting(edge(i), edge(k)));
         }
-        Ok(Self::oriented(vertices))
+        Ok(polygon.oriented())
     }
 
-    /// The polygon of these vertices, reversed if the area of the outline is negative. Nothing else is checked.
-    pub(super) fn oriented(mut vertices: Vec<Vector<f64, D>>) -> Self {
-        // 2 A = Σ (xᵢ − x₀) × (xᵢ₊₁ − x₀)
-        let fan = vertices.windows(2).map(|pair| cross(&(pair[0] - vertices[0]), &(pair[1] - vertices[0])));
-        if fan.sum::<f64>() < 0.0 {
-            vertices.reverse();
+    /// The polygon of these outlines, as they are. Nothing is checked.
+    pub(super) fn joined(outlines: &[Vec<Vector<f64, D>>]) -> Self {
+        let mut beside = Vec::new();
+        for n in outlines.iter().map(Vec::len) {
+            let first = beside.len();
+            beside.extend((0..n).map(|i| [first + (i + n - 1) % n, first + (i + 1) % n]));
         }
-        Self { vertices }
+        Self { vertices: outlines.concat(), beside }
+    }
+
+    /// The polygon, with all outlines reversed if its area is negative.
+    pub(super) fn oriented(mut self) -> Self {
+        // 2 A = Σ (xᵢ − x₀) × (xᵢ₊₁ − x₀)
+        let edges = (0..self.vertices.len()).map(|i| self.edge(i).map(|x| x - self.vertices[0]));
+        if edges.map(|[a, b]| cross(&a, &b)).sum::<f64>() < 0.0 {
+            let last = self.vertices.len() - 1;
+            self.vertices.reverse();
+            self.beside = self.beside.iter().rev().map(|[before, after]| [last - after, last - before]).collect();
+        }
+        self
     }
 
     /// The ends of edge i.
     fn edge(&self, i: usize) -> [&Vector<f64, D>; 2] {
-        [&self.vertices[i], &self.vertices[(i + 1) % self.vertices.len()]]
+        [&self.vertices[i], &self.vertices[self.beside[i][1]]]
     }
 
     /// The outward normal of edge i.
@@ -122,9 +148,8 @@ impl<const D: usize> Polygon<D> {
     }
 
     fn nearest_part(&self, x: &Vector<f64, D>) -> OutlinePart {
-        let n = self.vertices.len();
         let (mut squared, mut nearest) = (f64::INFINITY, (0, 0.0));
-        for i in 0..n {
+        for i in 0..self.vertices.len() {
             let (t, foot) = foot(x, self.edge(i));
             let s = (x - foot).norm_squared();
             if s < squared {
@@ -133,7 +158,7 @@ impl<const D: usize> Polygon<D> {
         }
         match nearest {
             (i, t) if t > 0.0 && t < 1.0 => OutlinePart::Edge(i),
-            (i, t) => OutlinePart::Vertex(if t > 0.0 { (i + 1) % n } else { i }),
+            (i, t) => OutlinePart::Vertex(if t > 0.0 { self.beside[i][1] } else { i }),
         }
     }
 }
@@ -142,7 +167,6 @@ impl<const D: usize> Solid<D> for Polygon<D> {
     /// The nearest edge decides the side. If the nearest point is a vertex v, the two edges at v decide: d has the sign of
     /// (x − v)·(n₁ + n₂).
     fn nearest(&self, x: &Vector<f64, D>) -> Face<D> {
-        let n = self.vertices.len();
         let vertex = match self.nearest_part(x) {
             OutlinePart::Edge(i) => {
                 let normal = self.normal(i);
@@ -150,7 +174,7 @@ impl<const D: usize> Solid<D> for Polygon<D> {
             }
             OutlinePart::Vertex(vertex) => vertex,
         };
-        let between = self.normal((vertex + n - 1) % n) + self.normal(vertex);
+        let between = self.normal(self.beside[vertex][0]) + self.normal(vertex);
         let away = x - self.vertices[vertex];
         let distance = if away.dot(&between) < 0.0 { -away.norm() } else { away.norm() };
         (distance, if distance == 0.0 { between / between.norm() } else { away / distance })

@@ -1,10 +1,10 @@
 //! Invalid and malicious input to the program.
 
 use crate::support::{Failure, Random, said, shipped};
-use crate::{images, surfaces};
+use crate::{images, meshes, surfaces};
 use bfree::causes;
 use bfree::checkpoint::{self, Identity};
-use bfree::scene::{self, Scene, SceneError, particle_file, surface_file};
+use bfree::scene::{self, Scene, SceneError, mesh_file, particle_file, surface_file};
 use bfree::simulation::Simulation;
 use bfree::tensor::Vector;
 use serde_json::{Value, json};
@@ -220,6 +220,8 @@ struct Inputs {
     picture: Vec<u8>,
     /// One box as a binary and as a written STL file, and as PLY.
     surfaces: [Vec<u8>; 3],
+    /// A mesh as text and as binary file.
+    meshes: [Vec<u8>; 2],
     /// A scene whose body has the shape of the picture.
     pictured: Scene,
     identity: Identity,
@@ -244,10 +246,12 @@ impl Inputs {
         surfaces::stl(&cube, &stl)?;
         let surfaces =
             [std::fs::read(stl)?, surfaces::ascii_stl(&cube).into_bytes(), surfaces::ply(&cube).into_bytes()];
-        Ok(Self { folder, texts, scenes, picture, surfaces, pictured, identity, fresh, checkpoint })
+        let mesh = |name: &str| std::fs::read(meshes::folder().join(name));
+        let meshes = [mesh("plate.msh")?, mesh("plate_binary.msh")?];
+        Ok(Self { folder, texts, scenes, picture, surfaces, meshes, pictured, identity, fresh, checkpoint })
     }
 
-    /// The input of a kind, 0 to 12.
+    /// The input of a kind, 0 to 13.
     fn broken(&self, kind: u64, random: &mut Random) -> Vec<u8> {
         match kind {
             0..6 => changed(&self.scenes, random).to_string().into_bytes(),
@@ -256,6 +260,7 @@ impl Inputs {
             9 => broken(&self.picture, random),
             10 => broken(&self.surfaces[random.below(2) as usize], random),
             11 => broken(&self.surfaces[2], random),
+            12 => broken(&self.meshes[random.below(2) as usize], random),
             _ => broken(&self.checkpoint, random),
         }
     }
@@ -266,7 +271,8 @@ impl Inputs {
             9 => "fuzz.png",
             10 => "fuzz.stl",
             11 => "fuzz.ply",
-            12 => "checkpoint_1.bfree",
+            12 => "fuzz.msh",
+            13 => "checkpoint_1.bfree",
             _ => return None,
         };
         Some(self.folder.path().join(name))
@@ -285,6 +291,7 @@ impl Inputs {
                 }
             },
             10 | 11 => (self.file(kind).is_none_or(|file| surface_file::read_file(&file).is_err()), false),
+            12 => (self.file(kind).is_none_or(|file| mesh_file::read_group::<2>(&file, "steel").is_err()), false),
             _ => {
                 let result = checkpoint::restore(self.folder.path(), &self.identity, &mut self.fresh.clone());
                 assert!(result.is_err() || input == self.checkpoint, "a damaged checkpoint is taken for a good one");
@@ -317,7 +324,7 @@ fn fuzz() -> Result<(), Failure> {
     let mut random = Random(1);
     let (mut refused, mut built, mut slowest) = (0_u64, 0_u64, (Duration::ZERO, String::new()));
     for k in 0..inputs {
-        let kind = k % 13;
+        let kind = k % 14;
         let input = all.broken(kind, &mut random);
         if let Some(file) = all.file(kind) {
             std::fs::write(file, &input)?;

@@ -28,6 +28,7 @@ mod laws;
 mod loads;
 mod manual;
 mod memory;
+mod meshes;
 mod multigrid;
 mod obstacles;
 mod output;

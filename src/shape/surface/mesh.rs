@@ -90,40 +90,11 @@ impl Mesh {
         self.triangles[triangle].map(|i| self.vertices[i as usize])
     }
 
-    /// The nearest point of a triangle (Ericson, Real-Time Collision Detection, 5.1.5).
-    pub(crate) fn foot(&self, triangle: usize, x: &Vector3<f64>) -> (Vector3<f64>, Foot) {
-        let [a, b, c] = self.corners(triangle);
-        let (ab, ac) = (b - a, c - a);
-        let along = |from: Vector3<f64>| (ab.dot(&(x - from)), ac.dot(&(x - from)));
-        let ((d1, d2), (d3, d4), (d5, d6)) = (along(a), along(b), along(c));
-        if d1 <= 0.0 && d2 <= 0.0 {
-            return (a, Foot::Vertex(0));
-        }
-        if d3 >= 0.0 && d4 <= d3 {
-            return (b, Foot::Vertex(1));
-        }
-        if d6 >= 0.0 && d5 <= d6 {
-            return (c, Foot::Vertex(2));
-        }
-        let (vc, vb, va) = (d1 * d4 - d3 * d2, d5 * d2 - d1 * d6, d3 * d6 - d5 * d4);
-        if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
-            return (a + ab * (d1 / (d1 - d3)), Foot::Edge(0));
-        }
-        if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
-            return (a + ac * (d2 / (d2 - d6)), Foot::Edge(2));
-        }
-        if va <= 0.0 && d4 >= d3 && d5 >= d6 {
-            return (b + (c - b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6))), Foot::Edge(1));
-        }
-        let sum = va + vb + vc;
-        (a + ab * (vb / sum) + ac * (vc / sum), Foot::Inside)
-    }
-
     /// d and ∇d, and the nearest triangle with the part of it that is nearest. The normals of the triangles that meet at the nearest point
     /// decide the sign of d, each weighted by its angle (Bærentzen and Aanæs, 2005).
     pub(crate) fn nearest(&self, x: &Vector3<f64>) -> (f64, Vector3<f64>, Option<(usize, Foot)>) {
         let distance = |triangle: usize| {
-            let (at, part) = self.foot(triangle, x);
+            let (at, part) = foot(self.corners(triangle), x);
             ((x - at).norm_squared(), (x - at, part))
         };
         let Some((squared, triangle, (away, foot))) = self.tree.nearest(x, distance) else {
@@ -144,4 +115,32 @@ impl Mesh {
         };
         (distance, direction, Some((triangle, foot)))
     }
+}
+
+/// The nearest point of a triangle (Ericson, Real-Time Collision Detection, 5.1.5). A segment is a triangle with its last corner twice.
+pub(crate) fn foot([a, b, c]: [Vector3<f64>; 3], x: &Vector3<f64>) -> (Vector3<f64>, Foot) {
+    let (ab, ac) = (b - a, c - a);
+    let along = |from: Vector3<f64>| (ab.dot(&(x - from)), ac.dot(&(x - from)));
+    let ((d1, d2), (d3, d4), (d5, d6)) = (along(a), along(b), along(c));
+    if d1 <= 0.0 && d2 <= 0.0 {
+        return (a, Foot::Vertex(0));
+    }
+    if d3 >= 0.0 && d4 <= d3 {
+        return (b, Foot::Vertex(1));
+    }
+    if d6 >= 0.0 && d5 <= d6 {
+        return (c, Foot::Vertex(2));
+    }
+    let (vc, vb, va) = (d1 * d4 - d3 * d2, d5 * d2 - d1 * d6, d3 * d6 - d5 * d4);
+    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
+        return (a + ab * (d1 / (d1 - d3)), Foot::Edge(0));
+    }
+    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
+        return (a + ac * (d2 / (d2 - d6)), Foot::Edge(2));
+    }
+    if va <= 0.0 && d4 >= d3 && d5 >= d6 {
+        return (b + (c - b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6))), Foot::Edge(1));
+    }
+    let sum = va + vb + vc;
+    (a + ab * (vb / sum) + ac * (vc / sum), Foot::Inside)
 }

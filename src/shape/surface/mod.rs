@@ -2,15 +2,17 @@
 
 mod mesh;
 mod rows;
+mod sheet;
 mod sound;
 mod tree;
 
+pub use sheet::Sheet;
 pub use sound::SurfaceError;
 
 use super::bounds::Bounds;
 use super::{Face, Facet, Feature, GridBox, Part, Solid};
 use crate::tensor::{Tensor, Vector};
-use mesh::{Foot, Mesh};
+use mesh::{Foot, Mesh, foot};
 use nalgebra::{Matrix3, Vector3};
 use std::sync::Arc;
 
@@ -79,11 +81,16 @@ impl<const D: usize> Surface<D> {
 }
 
 fn space<const D: usize>(x: &Vector<f64, D>) -> Vector3<f64> {
-    Vector3::from_fn(|k, _| x[k])
+    Vector3::from_fn(|k, _| if k < D { x[k] } else { 0.0 })
 }
 
 fn plane<const D: usize>(x: Vector3<f64>) -> Vector<f64, D> {
     Vector::from_fn(|k, _| x[k])
+}
+
+/// Whether two planes near the centre of a ball are the same in it, up to round-off.
+fn same<const D: usize>(one: &Face<D>, other: &Face<D>, radius: f64) -> bool {
+    (one.1 - other.1).norm() <= 1e-9 && (one.0 - other.0).abs() <= 1e-9 * radius
 }
 
 impl<const D: usize> Solid<D> for Surface<D> {
@@ -112,13 +119,12 @@ impl<const D: usize> Solid<D> for Surface<D> {
     fn add_planes(&self, x: &Vector<f64, D>, radius: f64, planes: &mut Vec<Face<D>>) -> f64 {
         let (mesh, x, reach) = (&self.mesh, space(x), Vector3::repeat(radius));
         let mut near = mesh.meeting(&Bounds(x - reach, x + reach));
-        near.retain(|&i| mesh.normals[i] != Vector3::zeros() && (mesh.foot(i, &x).0 - x).norm() < radius);
+        near.retain(|&i| mesh.normals[i] != Vector3::zeros() && (foot(mesh.corners(i), &x).0 - x).norm() < radius);
         let height = |i: usize, from: &Vector3<f64>| mesh.normals[i].dot(&(from - mesh.corners(i)[0]));
         let mut single: Vec<Face<D>> = Vec::new();
         for &i in &near {
             let face = (height(i, &x), plane(mesh.normals[i]));
-            let same = |other: &Face<D>| (other.1 - face.1).norm() <= 1e-9 && (other.0 - face.0).abs() <= 1e-9 * radius;
-            if single.len() <= PLANES && !single.iter().any(same) {
+            if single.len() <= PLANES && !single.iter().any(|other| same(other, &face, radius)) {
                 single.push(face);
             }
         }
@@ -151,11 +157,13 @@ impl<const D: usize> Solid<D> for Surface<D> {
 
     /// The triangles, clipped to the box.
     fn facets(&self, of: &GridBox<D>, planes: &[Face<D>]) -> Option<Vec<Facet<D>>> {
-        let (mesh, half) = (&self.mesh, space(&of.edges) * 0.5);
-        let center = space(&of.lower) + half;
+        let (mesh, half, round_off) = (&self.mesh, space(&of.edges) * 0.5, of.round_off());
+        let (center, reach) = (space(&of.lower) + half, half.add_scalar(round_off));
+        // A corner lies in a face of this box if it does so in the box beyond, whatever round-off: no triangle is left to neither.
+        let snapped = |x: f64, half: f64| if (x.abs() - half).abs() <= round_off { half.copysign(x) } else { x };
         let mut facets = Vec::new();
-        for i in mesh.meeting(&Bounds(center - half, center + half)) {
-            let corners = mesh.corners(i).map(|corner| corner - center).to_vec();
+        for i in mesh.meeting(&Bounds(center - reach, center + reach)) {
+            let corners = mesh.corners(i).map(|corner| (corner - center).zip_map(&half, snapped)).to_vec();
             // A triangle in a face of the box belongs to the box on the inner side of that triangle.
             let outside = |k: usize, sign: f64| {
                 sign * mesh.normals[i][k] < 0.0 && corners.iter().all(|corner| sign * corner[k] >= half[k])
@@ -167,7 +175,8 @@ impl<const D: usize> Solid<D> for Surface<D> {
             for (distance, normal) in planes {
                 let normal = space(normal);
                 let halves = polygons.iter().map(|polygon| rows::split(polygon, |x| distance + normal.dot(x)));
-                polygons = halves.flat_map(|(below, above)| [below, above]).collect();
+                let halves = halves.flat_map(|(below, above)| [below, above]);
+                polygons = halves.filter(|polygon| !polygon.is_empty()).collect();
             }
             for polygon in polygons {
                 let fan = polygon.iter().skip(1).zip(polygon.iter().skip(2)).map(|(b, c)| [polygon[0], *b, *c]);
