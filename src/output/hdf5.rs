@@ -5,6 +5,7 @@
 //! and written as soon as they are known, so the writer holds none. The same content gives the same bytes.
 
 use super::vtu::compressed;
+use flate2::Compression;
 use std::io::{Error, Result, Seek, SeekFrom, Write};
 
 /// The address of what is not there.
@@ -20,8 +21,10 @@ pub(super) enum Type {
     I64,
     U32,
     U8,
-    /// Texts of at most so many bytes, padded with zeros.
+    /// ASCII of so many bytes.
     Text(u32),
+    /// Texts of any length, in a heap of the file.
+    HeapText,
 }
 
 impl Type {
@@ -31,6 +34,7 @@ impl Type {
             Self::U32 => 4,
             Self::U8 => 1,
             Self::Text(size) => size,
+            Self::HeapText => 16,
         }
     }
 
@@ -42,8 +46,9 @@ impl Type {
             Self::I64 => ([0x10, 0x08, 0, 0], &[0, 0, 64, 0]),
             Self::U32 => ([0x10, 0, 0, 0], &[0, 0, 32, 0]),
             Self::U8 => ([0x10, 0, 0, 0], &[0, 0, 8, 0]),
-            // UTF-8
-            Self::Text(_) => ([0x13, 0x11, 0, 0], &[]),
+            Self::Text(_) => ([0x13, 0x01, 0, 0], &[]),
+            // A sequence of texts of one byte. The library converts no texts, and VTK asks for ASCII.
+            Self::HeapText => ([0x19, 0x01, 0, 0], &[0x10, 0, 0, 0, 1, 0, 0, 0, 0, 0, 8, 0]),
         };
         [&head, &self.size().to_le_bytes()[..], bits].concat()
     }
@@ -54,25 +59,34 @@ pub(super) fn whole(numbers: impl IntoIterator<Item = usize>) -> Vec<u8> {
     numbers.into_iter().flat_map(|number| (number as i64).to_le_bytes()).collect()
 }
 
-/// A dataset of chunks that lie one behind the other along its first axis.
+/// A dataset that grows along its first axis. Each of its columns has chunks of its own, because columns alone compress better.
 #[derive(Debug)]
 pub(super) struct Chunked {
     numbers: Type,
-    /// Rows and columns of a chunk.
-    shape: Vec<u64>,
-    /// Address and bytes of each chunk.
+    /// Rows of a chunk.
+    rows: usize,
+    columns: usize,
+    /// Address and bytes of each chunk, the chunks of the first rows first.
     chunks: Vec<(u64, u32)>,
+    /// Rows that fill no chunk yet.
+    held: Vec<u8>,
 }
 
 impl Chunked {
-    /// No chunks yet, of the given shape.
-    pub(super) fn new(numbers: Type, shape: Vec<u64>) -> Self {
-        Self { numbers, shape, chunks: Vec::new() }
+    /// A dataset without rows.
+    pub(super) fn new(numbers: Type, rows: usize, columns: usize) -> Self {
+        Self { numbers, rows, columns, chunks: Vec::new(), held: Vec::new() }
     }
 
-    /// The number of chunks.
-    pub(super) fn len(&self) -> usize {
-        self.chunks.len()
+    /// The bytes of a row.
+    pub(super) fn width(&self) -> usize {
+        self.columns * self.numbers.size() as usize
+    }
+
+    /// The extents of so many rows.
+    fn extents(&self, rows: usize) -> Vec<u64> {
+        let extents = [rows as u64, self.columns as u64];
+        extents.into_iter().take(self.columns.min(2)).collect()
     }
 }
 
@@ -101,48 +115,62 @@ impl<W: Write + Seek> Writer<W> {
         Ok(address)
     }
 
-    /// Writes the next chunk of a dataset.
+    /// Adds rows to a dataset, and writes its chunks that are full.
     pub(super) fn add(&mut self, to: &mut Chunked, bytes: &[u8]) -> Result<()> {
+        to.held.extend(bytes);
+        if to.held.len() < to.rows * to.width() { Ok(()) } else { self.flush(to) }
+    }
+
+    /// Writes the rows that fill no chunk yet, and zeros after them. All datasets must be flushed before the first is written.
+    pub(super) fn flush(&mut self, to: &mut Chunked) -> Result<()> {
         let size = to.numbers.size() as usize;
-        let shuffled: Vec<u8> = (0..size).flat_map(|k| bytes.iter().skip(k).step_by(size)).copied().collect();
-        let packed = compressed(&shuffled);
-        to.chunks.push((self.put(&packed)?, small(packed.len())?));
-        self.half_node = self.half_node.max(small(to.len().div_ceil(2))?);
         // The format counts bytes of a chunk in 32 bits, and chunks of a node in 16.
-        let (_, _) = (small::<u32>(bytes.len())?, small::<u16>(to.len())?);
+        small::<u32>(to.rows * size)?;
+        let mut held = std::mem::take(&mut to.held);
+        held.resize(held.len().next_multiple_of(to.rows * to.width()), 0);
+        for block in held.chunks(to.rows * to.width()) {
+            for column in 0..to.columns {
+                let plane = |byte: usize| block.iter().skip(column * size + byte).step_by(to.width()).copied();
+                let shuffled: Vec<u8> = (0..size).flat_map(plane).collect();
+                let packed = compressed(&shuffled, Compression::default());
+                to.chunks.push((self.put(&packed)?, small(packed.len())?));
+            }
+        }
+        small::<u16>(to.chunks.len())?;
+        self.half_node = self.half_node.max(small(to.chunks.len().div_ceil(2))?);
         Ok(())
     }
 
     /// Writes a dataset of chunks.
     pub(super) fn chunked(&mut self, of: &Chunked, attributes: &[Attribute]) -> Result<u64> {
-        let rows = of.shape.first().copied().unwrap_or(1);
-        let key = |size: u32, chunk: usize| {
-            let mut key = [size, 0].map(u32::to_le_bytes).concat();
-            // An offset along every axis, and one in the bytes of a number.
-            key.extend((chunk as u64 * rows).to_le_bytes());
-            key.resize(key.len() + 8 * of.shape.len(), 0);
-            key
+        let (chunk, count) = (of.extents(of.rows), of.chunks.len());
+        // The size of a chunk, the filters left out, and its place along every axis and in the bytes of a number.
+        let key = |size: u32, k: usize| {
+            let place =
+                [(k / of.columns * of.rows) as u64, (k % of.columns) as u64].into_iter().take(chunk.len()).chain([0]);
+            [size, 0]
+                .into_iter()
+                .flat_map(u32::to_le_bytes)
+                .chain(place.flat_map(u64::to_le_bytes))
+                .collect::<Vec<u8>>()
         };
-        let mut tree = [&b"TREE\x01\0"[..], &small::<u16>(of.len())?.to_le_bytes(), &[0xff; 16]].concat();
+        let mut tree = [&b"TREE\x01\0"[..], &small::<u16>(count)?.to_le_bytes(), &[0xff; 16]].concat();
         for (k, &(address, size)) in of.chunks.iter().enumerate() {
             tree.extend(key(size, k));
             tree.extend(address.to_le_bytes());
         }
-        let last = key(0, of.len());
+        let last = key(0, count);
         tree.extend(&last);
-        tree.resize(tree.len() + (2 * usize::from(self.half_node) - of.len()) * (last.len() + 8), 0);
-        let address = self.put(&tree)?;
-        let mut layout = vec![3, 2, small(of.shape.len() + 1)?];
-        layout.extend(address.to_le_bytes());
-        for &extent in &of.shape {
-            layout.extend(small::<u32>(extent as usize)?.to_le_bytes());
+        tree.resize(tree.len() + (2 * usize::from(self.half_node) - count) * (last.len() + 8), 0);
+        let mut layout = vec![3, 2, small(chunk.len() + 1)?];
+        layout.extend(self.put(&tree)?.to_le_bytes());
+        for extent in [of.rows, 1].into_iter().take(chunk.len()).chain([of.numbers.size() as usize]) {
+            layout.extend(small::<u32>(extent)?.to_le_bytes());
         }
-        layout.extend(of.numbers.size().to_le_bytes());
-        let mut dims = of.shape.clone();
-        dims.iter_mut().take(1).for_each(|extent| *extent *= of.len() as u64);
+        let dims = of.extents(count / of.columns * of.rows);
         // Version 2, two filters: shuffle (2) by the size of a number, then deflate (1) with its level. Each has one value.
         let mut pipeline = vec![2, 2];
-        for (filter, value) in [(2, of.numbers.size()), (1, 1)] {
+        for (filter, value) in [(2, of.numbers.size()), (1, Compression::default().level())] {
             pipeline.extend([filter, 0, 0, 0, 1, 0]);
             pipeline.extend(value.to_le_bytes());
         }
@@ -153,6 +181,30 @@ impl<W: Write + Seek> Writer<W> {
     pub(super) fn whole(&mut self, numbers: Type, dims: &[u64], bytes: &[u8]) -> Result<u64> {
         let place = [self.put(bytes)?, bytes.len() as u64].map(u64::to_le_bytes).concat();
         self.dataset(numbers, dims, vec![(0x08, [&[3, 1], &place[..]].concat())], &[])
+    }
+
+    /// Writes a dataset of texts, and the heap that holds them.
+    pub(super) fn texts(&mut self, texts: &[String]) -> Result<u64> {
+        let mut heap = Vec::new();
+        for (k, text) in texts.iter().enumerate() {
+            // Objects have numbers from 1.
+            heap.extend([small(k + 1)?, 1, 0, 0].map(u16::to_le_bytes).concat());
+            heap.extend((text.len() as u64).to_le_bytes());
+            heap.extend(text.as_bytes());
+            heap.resize(heap.len().next_multiple_of(8), 0);
+        }
+        // The rest of a heap is an object with the number 0, and the smallest heap has 4096 bytes.
+        let (used, size) = (heap.len() as u64 + 16, (heap.len() + 32).max(4096));
+        heap.extend([0, size as u64 - used].map(u64::to_le_bytes).concat());
+        heap.resize(size - 16, 0);
+        let heap = self.put(&[b"GCOL\x01\0\0\0", &(size as u64).to_le_bytes()[..], &heap].concat())?;
+        let mut places = Vec::new();
+        for (k, text) in texts.iter().enumerate() {
+            places.extend(small::<u32>(text.len())?.to_le_bytes());
+            places.extend(heap.to_le_bytes());
+            places.extend(small::<u32>(k + 1)?.to_le_bytes());
+        }
+        self.whole(Type::HeapText, &[texts.len() as u64], &places)
     }
 
     fn dataset(
@@ -237,5 +289,7 @@ fn space(dims: &[u64]) -> Vec<u8> {
 
 /// A number in a field of the format that may be too small for it.
 fn small<T: TryFrom<usize>>(number: usize) -> Result<T> {
-    number.try_into().map_err(|_| Error::other(format!("{number} is more than HDF5 counts here: write fewer snapshots or particles")))
+    number.try_into().map_err(|_| {
+        Error::other(format!("{number} is more than HDF5 counts here: write fewer snapshots or particles"))
+    })
 }

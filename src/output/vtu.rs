@@ -38,7 +38,11 @@ impl Array {
 
     /// The values as a file holds them.
     pub(super) fn bytes(&self) -> Vec<u8> {
-        if self.is_index { self.values.iter().flat_map(|&x| (x as u32).to_le_bytes()).collect() } else { bytes(&self.values) }
+        if self.is_index {
+            self.values.iter().flat_map(|&x| (x as u32).to_le_bytes()).collect()
+        } else {
+            bytes(&self.values)
+        }
     }
 
     /// The names of the components, as in a table.
@@ -122,7 +126,7 @@ impl Parts {
             self.xml += &format!(r#" ComponentName{k}="{component}""#);
         }
         self.xml += &format!(" format=\"appended\" offset=\"{}\"/>\n", self.data.len());
-        let blocks: Vec<Vec<u8>> = bytes.chunks(BLOCK).map(compressed).collect();
+        let blocks: Vec<Vec<u8>> = bytes.chunks(BLOCK).map(|block| compressed(block, Compression::fast())).collect();
         let header = [blocks.len(), BLOCK, bytes.len() % BLOCK].into_iter().chain(blocks.iter().map(Vec::len));
         self.data.extend(header.flat_map(|word| (word as u64).to_le_bytes()));
         self.data.extend(blocks.iter().flatten());
@@ -140,10 +144,10 @@ impl Parts {
 }
 
 /// A block in the format of zlib.
-pub(super) fn compressed(block: &[u8]) -> Vec<u8> {
+pub(super) fn compressed(block: &[u8], how: Compression) -> Vec<u8> {
     let mut out = Vec::new();
     // Reading from memory into memory cannot fail.
-    let _ = ZlibEncoder::new(block, Compression::fast()).read_to_end(&mut out);
+    let _ = ZlibEncoder::new(block, how).read_to_end(&mut out);
     out
 }
 
