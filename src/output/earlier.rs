@@ -133,8 +133,9 @@ pub(super) fn remove_later_files(directory: &Path, mark: Option<&Mark>) -> Resul
         let name = entry.file_name();
         let Some(name) = name.to_str() else { continue };
         let file = (FILES.contains(&name) || is_series(name)) && !continued(name);
-        // The provenance stays until the run replaces it.
-        let is_old = file || role(name) == Some(Role::Drawn) || snapshots.precedes(name);
+        // The provenance of a run that goes on stays until it is replaced.
+        let made = role(name) == Some(Role::Drawn) || role(name) == Some(Role::Provenance) && mark.is_none();
+        let is_old = file || made || snapshots.precedes(name);
         if is_old || name.starts_with(TEMPORARY) {
             std::fs::remove_file(entry.path()).map_err(OutputError::io("remove", &entry.path()))?;
         }

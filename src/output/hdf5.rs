@@ -23,8 +23,6 @@ pub(super) enum Type {
     U8,
     /// ASCII of so many bytes.
     Text(u32),
-    /// Texts of any length, in a heap of the file.
-    HeapText,
 }
 
 impl Type {
@@ -34,7 +32,6 @@ impl Type {
             Self::U32 => 4,
             Self::U8 => 1,
             Self::Text(size) => size,
-            Self::HeapText => 16,
         }
     }
 
@@ -47,11 +44,14 @@ impl Type {
             Self::U32 => ([0x10, 0, 0, 0], &[0, 0, 32, 0]),
             Self::U8 => ([0x10, 0, 0, 0], &[0, 0, 8, 0]),
             Self::Text(_) => ([0x13, 0x01, 0, 0], &[]),
-            // A sequence of texts of one byte. The library converts no texts, and VTK asks for ASCII.
-            Self::HeapText => ([0x19, 0x01, 0, 0], &[0x10, 0, 0, 0, 1, 0, 0, 0, 0, 0, 8, 0]),
         };
         [&head, &self.size().to_le_bytes()[..], bits].concat()
     }
+}
+
+/// Whether an object can have this name.
+pub(super) fn is_link(name: &str) -> bool {
+    !name.is_empty() && name != "." && !name.contains('/')
 }
 
 /// The bytes of signed whole numbers.
@@ -178,33 +178,14 @@ impl<W: Write + Seek> Writer<W> {
     }
 
     /// Writes a dataset at once. Its bytes must fill `dims`.
-    pub(super) fn whole(&mut self, numbers: Type, dims: &[u64], bytes: &[u8]) -> Result<u64> {
+    pub(super) fn values(&mut self, numbers: Type, dims: &[u64], bytes: &[u8]) -> Result<u64> {
         let place = [self.put(bytes)?, bytes.len() as u64].map(u64::to_le_bytes).concat();
         self.dataset(numbers, dims, vec![(0x08, [&[3, 1], &place[..]].concat())], &[])
     }
 
-    /// Writes a dataset of texts, and the heap that holds them.
-    pub(super) fn texts(&mut self, texts: &[String]) -> Result<u64> {
-        let mut heap = Vec::new();
-        for (k, text) in texts.iter().enumerate() {
-            // Objects have numbers from 1.
-            heap.extend([small(k + 1)?, 1, 0, 0].map(u16::to_le_bytes).concat());
-            heap.extend((text.len() as u64).to_le_bytes());
-            heap.extend(text.as_bytes());
-            heap.resize(heap.len().next_multiple_of(8), 0);
-        }
-        // The rest of a heap is an object with the number 0, and the smallest heap has 4096 bytes.
-        let (used, size) = (heap.len() as u64 + 16, (heap.len() + 32).max(4096));
-        heap.extend([0, size as u64 - used].map(u64::to_le_bytes).concat());
-        heap.resize(size - 16, 0);
-        let heap = self.put(&[b"GCOL\x01\0\0\0", &(size as u64).to_le_bytes()[..], &heap].concat())?;
-        let mut places = Vec::new();
-        for (k, text) in texts.iter().enumerate() {
-            places.extend(small::<u32>(text.len())?.to_le_bytes());
-            places.extend(heap.to_le_bytes());
-            places.extend(small::<u32>(k + 1)?.to_le_bytes());
-        }
-        self.whole(Type::HeapText, &[texts.len() as u64], &places)
+    /// Writes a dataset of whole numbers at once.
+    pub(super) fn whole(&mut self, dims: &[u64], numbers: impl IntoIterator<Item = usize>) -> Result<u64> {
+        self.values(Type::I64, dims, &whole(numbers))
     }
 
     fn dataset(
@@ -219,7 +200,7 @@ impl<W: Write + Seek> Writer<W> {
         self.object(about.into_iter().chain(storage), attributes)
     }
 
-    /// Writes a group of objects, given by names and addresses. A name has no `/`.
+    /// Writes a group of objects, given by names and addresses; see [`is_link`].
     pub(super) fn group(&mut self, links: &[(&str, u64)], attributes: &[Attribute]) -> Result<u64> {
         let mut messages = vec![(0x02, [&[0, 0], &[0xff; 16][..]].concat())];
         for (name, address) in links {
@@ -233,7 +214,7 @@ impl<W: Write + Seek> Writer<W> {
     /// Writes the header of an object, and returns its address.
     fn object(&mut self, messages: impl IntoIterator<Item = (u16, Vec<u8>)>, attributes: &[Attribute]) -> Result<u64> {
         let (mut count, mut body) = (0, Vec::new());
-        let attributes = attributes.iter().map(|one| (0x0c, one.message()));
+        let attributes = attributes.iter().map(|one| (0x0c, attribute(one)));
         for (kind, data) in messages.into_iter().chain(attributes) {
             let padded = data.len().next_multiple_of(8);
             body.extend([kind, small(padded)?, 0, 0].map(u16::to_le_bytes).concat());
@@ -257,28 +238,20 @@ impl<W: Write + Seek> Writer<W> {
     }
 }
 
-/// A value with a name, at a group or a dataset.
-#[derive(Debug)]
-pub(super) struct Attribute<'a> {
-    pub name: &'a str,
-    pub numbers: Type,
-    pub dims: &'a [u64],
-    pub bytes: Vec<u8>,
-}
+/// A value of a group or a dataset: its name, its type, its extents and its bytes.
+pub(super) type Attribute<'a> = (&'a str, Type, Vec<u64>, Vec<u8>);
 
-impl Attribute<'_> {
-    fn message(&self) -> Vec<u8> {
-        let parts = [[self.name.as_bytes(), &[0]].concat(), self.numbers.message(), space(self.dims)];
-        let mut out = vec![1, 0];
-        // Names and types of attributes here are short.
-        parts.iter().for_each(|part| out.extend((part.len() as u16).to_le_bytes()));
-        for part in &parts {
-            out.extend(part);
-            out.resize(out.len().next_multiple_of(8), 0);
-        }
-        out.extend(&self.bytes);
-        out
+/// The message of an attribute. Names and types of attributes here are short.
+fn attribute((name, numbers, dims, bytes): &Attribute) -> Vec<u8> {
+    let parts = [[name.as_bytes(), &[0]].concat(), numbers.message(), space(dims)];
+    let mut out = vec![1, 0];
+    parts.iter().for_each(|part| out.extend((part.len() as u16).to_le_bytes()));
+    for part in &parts {
+        out.extend(part);
+        out.resize(out.len().next_multiple_of(8), 0);
     }
+    out.extend(bytes);
+    out
 }
 
 /// The message of the extents of an array; a single value has none.

@@ -5,9 +5,9 @@
 
 use super::OutputError;
 use super::files::write_atomically;
-use super::hdf5::{Attribute, Chunked, Type, Writer, whole};
+use super::hdf5::{Chunked, Type, Writer, is_link, whole};
 use super::pvd::{self, SERIES};
-use super::vtu::{Array, Background, Snapshot, TYPES, bytes};
+use super::vtu::{Array, Snapshot, TYPES, bytes};
 use std::io::{Error, Result, Seek, Write};
 use std::path::{Path, PathBuf};
 
@@ -60,6 +60,11 @@ impl Column {
         Self { name: array.name.clone(), chunks, offsets: Vec::new(), last: Vec::new() }
     }
 
+    /// What must be the same in all snapshots.
+    fn kind(&self) -> (&str, usize) {
+        (&self.name, self.chunks.width())
+    }
+
     fn add(&mut self, file: &mut Writer<impl Write + Seek>, array: &Array, rows: usize) -> Result<()> {
         let mut bytes = array.bytes();
         bytes.resize(rows * self.chunks.width(), 0);
@@ -74,162 +79,118 @@ impl Column {
     }
 }
 
-fn write(out: impl Write + Seek, rows: usize, snapshots: &[PathBuf], bodies: &[String]) -> Result<()> {
-    let mut file = Writer::new(out)?;
-    let (mut columns, mut times, mut parts, mut last) = (Vec::new(), Vec::new(), Parts::default(), None);
-    for path in snapshots {
-        let Snapshot { time, background, points, mut arrays, corners } = Snapshot::read(path).map_err(Error::other)?;
-        // The last array is the positions.
+/// The snapshots of a series.
+#[derive(Default)]
+struct Series {
+    /// The points of the largest snapshot.
+    rows: usize,
+    /// The points of a cell.
+    corners: usize,
+    times: Vec<f64>,
+    /// The part of the grid at each time, and the points of each part. Snapshots with as many points as the one before share its part.
+    parts: Vec<usize>,
+    counts: Vec<usize>,
+    /// The arrays; the last is the positions.
+    columns: Vec<Column>,
+}
+
+impl Series {
+    fn add(&mut self, file: &mut Writer<impl Write + Seek>, path: &Path) -> Result<()> {
+        let Snapshot { time, points, mut arrays, corners, .. } = Snapshot::read(path).map_err(Error::other)?;
         arrays.push(Array { components: vec![String::new(); 3], ..Array::scalar("Points", points.concat(), false) });
-        if times.is_empty() {
-            columns = arrays.iter().map(|array| Column::of(array, rows)).collect::<Vec<_>>();
+        let columns: Vec<_> = arrays.iter().map(|array| Column::of(array, self.rows)).collect();
+        if self.times.is_empty() {
+            self.columns = arrays.iter().map(|array| Column::of(array, self.rows)).collect();
         }
-        let is_same = |(column, array): (&Column, &Array)| {
-            let width = Column::of(array, rows).chunks.width();
-            column.name == array.name && column.chunks.width() == width && !array.name.contains('/')
-        };
-        if columns.len() != arrays.len() || !columns.iter().zip(&arrays).all(is_same) {
-            let what =
-                "has other fields than the first snapshot, or one with a / in its name, which HDF5 does not allow";
+        let is_same = columns.iter().map(Column::kind).eq(self.columns.iter().map(Column::kind));
+        if !is_same || !columns.iter().all(|column| is_link(&column.name)) {
+            let what = "has other fields than the first snapshot, or a name with /, which HDF5 does not allow";
             return Err(Error::other(OutputError::content(path, what)));
         }
-        times.push(time);
-        parts.add(points.len());
-        for (column, array) in columns.iter_mut().zip(&arrays) {
-            column.add(&mut file, array, rows)?;
+        self.corners = corners.clamp(1, TYPES.len().min(self.rows));
+        self.times.push(time);
+        if self.counts.last() != Some(&points.len()) {
+            self.counts.push(points.len());
         }
-        last = Some((background, corners.clamp(1, TYPES.len().min(rows))));
+        self.parts.push(self.counts.len() - 1);
+        self.columns.iter_mut().zip(&arrays).try_for_each(|(column, array)| column.add(file, array, self.rows))
     }
-    let (background, corners) = last.ok_or_else(|| Error::other("there is no snapshot"))?;
-    let fields = field_data(&mut file, background, bodies)?;
-    columns.iter_mut().try_for_each(|column| file.flush(&mut column.chunks))?;
-    let root = root(&mut file, [rows, corners], (&times, &parts), &columns, &fields)?;
+}
+
+fn write(out: impl Write + Seek, rows: usize, snapshots: &[PathBuf], bodies: &[String]) -> Result<()> {
+    let (mut file, mut series) = (Writer::new(out)?, Series { rows, ..Series::default() });
+    snapshots.iter().try_for_each(|path| series.add(&mut file, path))?;
+    series.columns.iter_mut().try_for_each(|column| file.flush(&mut column.chunks))?;
+    let bodies = bodies.iter().map(String::as_str).enumerate().filter(|(_, name)| is_link(name)).collect::<Vec<_>>();
+    let root = root(&mut file, &series, &bodies)?;
     let root = file.group(&[("VTKHDF", root)], &[])?;
     file.finish(root)
 }
 
-/// The numbers of points at all times. Times with the same number share a part of the grid.
-#[derive(Default)]
-struct Parts {
-    counts: Vec<usize>,
-    /// The part of each time.
-    of_times: Vec<usize>,
-}
-
-impl Parts {
-    fn add(&mut self, count: usize) {
-        if self.counts.last() != Some(&count) {
-            self.counts.push(count);
-        }
-        self.of_times.push(self.counts.len() - 1);
-    }
-}
-
-/// The group of a grid with time steps. The cells of a part are the first of those of `rows` points, with so many `corners` each.
-fn root(
-    file: &mut Writer<impl Write + Seek>,
-    [rows, corners]: [usize; 2],
-    (times, parts): (&[f64], &Parts),
-    columns: &[Column],
-    fields: &[Field],
-) -> Result<u64> {
-    let cells = rows / corners;
-    let count = parts.counts.len();
-    let mut topology = |numbers, rows: usize, count: usize, bytes: &[u8]| -> Result<Chunked> {
+/// The group of a grid with time steps. The field data are the bodies with their numbers. They are no list of texts, of which VTK 9.3 takes
+/// the first only.
+fn root(file: &mut Writer<impl Write + Seek>, series: &Series, bodies: &[(usize, &str)]) -> Result<u64> {
+    let Series { rows, corners, ref counts, ref columns, .. } = *series;
+    let (cells, parts) = (rows / corners, counts.len());
+    let mut topology = |numbers, rows: usize, parts: usize, bytes: &[u8]| -> Result<Chunked> {
         let mut chunks = Chunked::new(numbers, rows, 1);
-        (0..count).try_for_each(|_| file.add(&mut chunks, bytes))?;
+        (0..parts).try_for_each(|_| file.add(&mut chunks, bytes))?;
         Ok(chunks)
     };
+    // The cells of a part are the first of those of the largest snapshot.
     let connectivity = topology(Type::I64, rows, 1, &whole(0..rows))?;
-    // Readers take the ends of a part's cells, one more than cells, from where the cells begin, plus the number of the part.
-    let ends = topology(Type::I64, cells + 1, count, &whole((0..=cells).map(|cell| cell * corners)))?;
-    let types = topology(Type::U8, cells, count, &vec![TYPES[corners - 1]; cells])?;
+    let ends = topology(Type::I64, cells + 1, parts, &whole((0..=cells).map(|cell| cell * corners)))?;
+    let types = topology(Type::U8, cells, parts, &vec![TYPES[corners - 1]; cells])?;
     // Warp By Vector takes this array. The attribute is of version 2.6, and earlier readers ignore it.
-    let vectors = [Attribute { name: "Attribute", numbers: Type::Text(7), dims: &[], bytes: b"Vectors".to_vec() }];
-    let mut data = Vec::new();
+    let vectors = [("Attribute", Type::Text(7), vec![], b"Vectors".to_vec())];
+    let (mut data, mut numbers) = (Vec::new(), Vec::new());
     for column in columns {
         let attributes = if column.name == "displacement" { &vectors[..] } else { &[] };
         data.push((column.name.as_str(), file.chunked(&column.chunks, attributes)?));
     }
-    let (_, positions) = data.pop().ok_or_else(|| Error::other("no points"))?;
-    let mut numbers = |divisor: usize| {
-        file.whole(Type::I64, &[count as u64], &whole(parts.counts.iter().map(|count| count / divisor)))
-    };
-    let (points, cell_counts) = (numbers(1)?, numbers(corners)?);
-    let steps = steps(file, times, (&parts.of_times, cells), columns, fields)?;
+    let (_, positions) = data.pop().ok_or_else(|| Error::other("no positions"))?;
+    for &(number, name) in bodies {
+        numbers.push((name, file.whole(&[1], [number])?));
+    }
+    let extent = [parts as u64];
+    let points = file.whole(&extent, counts.iter().copied())?;
     let links = [
         ("NumberOfPoints", points),
-        ("NumberOfCells", cell_counts),
+        ("NumberOfCells", file.whole(&extent, counts.iter().map(|count| count / corners))?),
         ("NumberOfConnectivityIds", points),
         ("Points", positions),
         ("Connectivity", file.chunked(&connectivity, &[])?),
         ("Offsets", file.chunked(&ends, &[])?),
         ("Types", file.chunked(&types, &[])?),
         ("PointData", file.group(&data, &[])?),
-        ("FieldData", file.group(&fields.iter().map(|&(name, _, field)| (name, field)).collect::<Vec<_>>(), &[])?),
-        ("Steps", steps),
+        ("FieldData", file.group(&numbers, &[])?),
+        ("Steps", steps(file, series, cells, bodies)?),
     ];
     let kind = "UnstructuredGrid";
-    let attributes = [
-        Attribute { name: "Version", numbers: Type::I64, dims: &[2], bytes: whole([2, 2]) },
-        Attribute { name: "Type", numbers: Type::Text(kind.len() as u32), dims: &[], bytes: kind.into() },
-    ];
-    file.group(&links, &attributes)
-}
-
-/// An array that is the same at all times: its name, its length and its address.
-type Field = (&'static str, usize, u64);
-
-/// What is the same at all times: the background grid, as in a `.vtu`, and the names of the bodies.
-fn field_data(file: &mut Writer<impl Write + Seek>, background: Background, bodies: &[String]) -> Result<Vec<Field>> {
-    let Background { dimension, origin, spacing, cells } = background;
-    let u32s = |numbers: &[u32]| numbers.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>();
-    let mut fields = vec![
-        ("grid_dimension", 1, file.whole(Type::U32, &[1], &u32s(&[dimension]))?),
-        ("grid_origin", 3, file.whole(Type::F64, &[3], &bytes(&origin))?),
-        ("grid_spacing", 1, file.whole(Type::F64, &[1], &bytes(&[spacing]))?),
-        ("grid_cells", 3, file.whole(Type::U32, &[3], &u32s(&cells))?),
-    ];
-    if !bodies.is_empty() {
-        fields.push(("body_names", bodies.len(), file.texts(bodies)?));
-    }
-    Ok(fields)
+    let version = ("Version", Type::I64, vec![2], whole([2, 2]));
+    file.group(&links, &[version, ("Type", Type::Text(kind.len() as u32), vec![], kind.into())])
 }
 
 /// The group of the times: for each time and array, the row at which the values begin.
-fn steps(
-    file: &mut Writer<impl Write + Seek>,
-    times: &[f64],
-    (parts, cells): (&[usize], usize),
-    columns: &[Column],
-    fields: &[Field],
-) -> Result<u64> {
-    let count = times.len() as u64;
-    let none = whole(times.iter().map(|_| 0));
-    let (zeros, zero_rows) = (file.whole(Type::I64, &[count], &none)?, file.whole(Type::I64, &[count, 1], &none)?);
-    let ones = file.whole(Type::I64, &[count], &whole(times.iter().map(|_| 1)))?;
-    let (mut starts, mut sizes) = (Vec::new(), Vec::new());
-    for &(name, length, _) in fields {
-        // One component, and so many values.
-        sizes.push((name, file.whole(Type::I64, &[count, 2], &whole(times.iter().flat_map(|_| [1, length])))?));
-        starts.push((name, zeros));
-    }
-    let mut offsets = Vec::new();
+fn steps(file: &mut Writer<impl Write + Seek>, series: &Series, cells: usize, bodies: &[(usize, &str)]) -> Result<u64> {
+    let Series { times, parts, columns, .. } = series;
+    let (count, mut offsets) = (times.len() as u64, Vec::new());
     for column in columns {
-        offsets.push((column.name.as_str(), file.whole(Type::I64, &[count], &whole(column.offsets.iter().copied()))?));
+        offsets.push((column.name.as_str(), file.whole(&[count], column.offsets.iter().copied())?));
     }
-    let (_, points) = offsets.pop().ok_or_else(|| Error::other("no points"))?;
+    let (_, points) = offsets.pop().ok_or_else(|| Error::other("no positions"))?;
+    let zeros = file.whole(&[count], vec![0; times.len()])?;
+    let fields: Vec<_> = bodies.iter().map(|(_, name)| (*name, zeros)).collect();
     let links = [
-        ("Values", file.whole(Type::F64, &[count], &bytes(times))?),
-        ("NumberOfParts", ones),
-        ("PartOffsets", file.whole(Type::I64, &[count], &whole(parts.iter().copied()))?),
+        ("Values", file.values(Type::F64, &[count], &bytes(times))?),
+        ("NumberOfParts", file.whole(&[count], vec![1; times.len()])?),
+        ("PartOffsets", file.whole(&[count], parts.iter().copied())?),
         ("PointOffsets", points),
-        ("CellOffsets", file.whole(Type::I64, &[count, 1], &whole(parts.iter().map(|part| part * cells)))?),
-        ("ConnectivityIdOffsets", zero_rows),
+        // From here on, and as many ends more as there are parts before, readers take the ends of the cells.
+        ("CellOffsets", file.whole(&[count, 1], parts.iter().map(|part| part * cells))?),
+        ("ConnectivityIdOffsets", file.whole(&[count, 1], vec![0; times.len()])?),
         ("PointDataOffsets", file.group(&offsets, &[])?),
-        ("FieldDataOffsets", file.group(&starts, &[])?),
-        ("FieldDataSizes", file.group(&sizes, &[])?),
+        ("FieldDataOffsets", file.group(&fields, &[])?),
     ];
-    let bytes = whole([times.len()]);
-    file.group(&links, &[Attribute { name: "NSteps", numbers: Type::I64, dims: &[], bytes }])
+    file.group(&links, &[("NSteps", Type::I64, vec![], whole([times.len()]))])
 }

@@ -6,7 +6,7 @@ use super::run::Run;
 use crate::{causes, checkpoint};
 use crate::output::{self, Role};
 use clap::Args;
-use serde_json::Value;
+use serde_json::{Map, Value};
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -44,12 +44,16 @@ impl Reproduce {
             result => result?,
         }
         let names = names(directory)?.into_iter().chain(names(&self.out)?).collect::<BTreeSet<_>>();
-        let compared = names.iter().map(|name| (name, Verdict::of(directory, &self.out, name)));
         let (mut same, mut other) = (0, 0);
-        for (name, verdict) in compared {
+        for name in names {
+            let verdict = Verdict::of(directory, &self.out, &name);
             same += usize::from(matches!(verdict, Verdict::Same(_)));
             other += usize::from(matches!(verdict, Verdict::Other(_)));
-            verdict.print(name)?;
+            match verdict {
+                Verdict::Same(but) => print(format_args!("same          {name}{but}"))?,
+                Verdict::Other(place) => print(format_args!("DIFFERS       {name}{place}"))?,
+                Verdict::NotCompared(why) => print(format_args!("not compared  {name}{why}"))?,
+            }
         }
         print(format_args!("{same} files have the same bits, {other} have not"))?;
         if other == 0 { Ok(()) } else { Err(Failure::Told(1)) }
@@ -78,59 +82,47 @@ impl Provenance {
     }
 }
 
-/// The result of comparing a file.
+/// The result of comparing a file, and what to say of it.
 enum Verdict {
-    /// With what was left out.
     Same(&'static str),
-    /// With the place of the first difference.
     Other(String),
-    /// With the reason.
     NotCompared(&'static str),
 }
 
 impl Verdict {
     fn of(then: &Path, now: &Path, name: &str) -> Self {
         match output::role(name) {
-            None if checkpoint::is_checkpoint(name) => Self::NotCompared("it holds seconds"),
-            None => Self::NotCompared("no file of a run"),
-            Some(Role::Provenance) => Self::NotCompared("it names the directories"),
-            Some(Role::Drawn) => Self::NotCompared("bfree plot and bfree pack make it of the other files"),
+            None if checkpoint::is_checkpoint(name) => Self::NotCompared(": it holds seconds"),
+            None => Self::NotCompared(": no file of a run"),
+            Some(Role::Provenance) => Self::NotCompared(": it names the directories"),
+            Some(Role::Drawn) => Self::NotCompared(": bfree plot and bfree pack make it of the other files"),
             Some(Role::Result) => {
-                let [then, now] = [then, now].map(|directory| fs::read(directory.join(name)));
-                let (Ok(then), Ok(now)) = (then, now) else { return Self::Other("one of the runs has no such file".into()) };
-                if name == "report.json" { Self::of_reports(&then, &now) } else { Self::of_bytes(&then, &now) }
+                let read = |directory: &Path| fs::read(directory.join(name));
+                match (read(then), read(now)) {
+                    (Ok(then), Ok(now)) if name == "report.json" => Self::of_reports(&then, &now),
+                    (Ok(then), Ok(now)) => Self::of_bytes(&then, &now),
+                    _ => Self::Other(" one of the runs has no such file".to_owned()),
+                }
             }
         }
     }
 
     fn of_bytes(then: &[u8], now: &[u8]) -> Self {
-        if then == now {
-            return Self::Same("");
-        }
         let common = then.iter().zip(now).take_while(|(then, now)| then == now).count();
-        Self::Other(format!("from byte {common} of {} on", then.len()))
+        if then == now { Self::Same("") } else { Self::Other(format!(" from byte {common} of {} on", then.len())) }
     }
 
     fn of_reports(then: &[u8], now: &[u8]) -> Self {
-        let timeless = |text: &[u8]| {
-            let mut report: Value = serde_json::from_slice(text).ok()?;
-            let entries = report.as_object_mut()?;
-            let _ = (entries.remove("seconds"), entries.remove("command"));
-            Some(report)
-        };
-        let (Some(then), Some(now)) = (timeless(then), timeless(now)) else { return Self::Other("no report".into()) };
-        if then == now {
-            return Self::Same(" but for seconds and command");
-        }
-        let keys = then.as_object().into_iter().flatten().filter(|(key, value)| now[key.as_str()] != **value);
-        Self::Other(format!("in {}", keys.map(|(key, _)| key.as_str()).collect::<Vec<_>>().join(", ")))
-    }
-
-    fn print(&self, name: &str) -> Result<(), Failure> {
-        match self {
-            Self::Same(but) => print(format_args!("same          {name}{but}")),
-            Self::Other(place) => print(format_args!("DIFFERS       {name} {place}")),
-            Self::NotCompared(why) => print(format_args!("not compared  {name}: {why}")),
+        let [then, now] = [then, now].map(|text| {
+            let mut report: Map<String, Value> = serde_json::from_slice(text).unwrap_or_default();
+            report.retain(|key, _| !["seconds", "command"].contains(&key.as_str()));
+            report
+        });
+        let other: Vec<_> = then.iter().filter(|(key, value)| now.get(*key) != Some(*value)).map(|(key, _)| key.as_str()).collect();
+        if then == now && !then.is_empty() {
+            Self::Same(" but for seconds and command")
+        } else {
+            Self::Other(format!(" in {}", other.join(", ")))
         }
     }
 }
