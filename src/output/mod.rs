@@ -49,8 +49,8 @@ mod vtkhdf;
 pub mod vtu;
 pub mod warnings;
 
-pub(crate) use earlier::{Role, role};
 pub use earlier::{Held, foreign, held};
+pub(crate) use earlier::{Role, role};
 pub use error::OutputError;
 pub use mark::Mark;
 pub use probes::{Place, Probe, nearest};

@@ -117,7 +117,10 @@ impl Provenance {
         let wrong = |error| Failure::scene(format!("{} is no provenance of bfree: {error}", path.display()));
         let read: Self = serde_json::from_str(&text).map_err(wrong)?;
         if Written::of(read.scene.as_bytes()).ok() != Some(read.checksum) {
-            return Err(Failure::scene(format!("{}: its scene is not what was run: its checksum differs", path.display())));
+            return Err(Failure::scene(format!(
+                "{}: its scene is not what was run: its checksum differs",
+                path.display()
+            )));
         }
         Ok(read)
     }

@@ -3,8 +3,8 @@
 use super::failure::{Failure, print, tell};
 use super::provenance::{Maker, Provenance, of_file};
 use super::run::Run;
-use crate::{causes, checkpoint};
 use crate::output::{self, Role};
+use crate::{causes, checkpoint};
 use clap::Args;
 use serde_json::{Map, Value};
 use std::collections::BTreeSet;
@@ -118,7 +118,8 @@ impl Verdict {
             report.retain(|key, _| !["seconds", "command"].contains(&key.as_str()));
             report
         });
-        let other: Vec<_> = then.iter().filter(|(key, value)| now.get(*key) != Some(*value)).map(|(key, _)| key.as_str()).collect();
+        let other: Vec<_> =
+            then.iter().filter(|(key, value)| now.get(*key) != Some(*value)).map(|(key, _)| key.as_str()).collect();
         if then == now && !then.is_empty() {
             Self::Same(" but for seconds and command")
         } else {

@@ -27,11 +27,11 @@ mod view;
 pub use convergence::newton_norms;
 pub use view::View;
 
+use super::OutputError;
 use super::files::write_atomically;
+use super::pvd::{self, SERIES};
 use super::snapshots::beside;
 use super::vtu::Snapshot;
-use super::pvd::{self, SERIES};
-use super::OutputError;
 use axes::extremes;
 pub(super) use axes::rounded;
 use chart::{Heading, Line, Panel};
