@@ -1,17 +1,26 @@
-"""Reads the snapshots of a run with meshio and compares every field with what it must be.
+"""Reads the snapshots of a run with meshio and compares every field with what it must be. Reads the packed snapshots with h5py, and with vtk
+where it is installed, and compares every array and time with those of the snapshots: they must have the same bits.
 
-usage: read_back.py DIRECTORY — of a run in 2D with all fields in `output.fields`, one body, and no loads."""
+usage: read_back.py DIRECTORY — of a packed run in 2D with all fields in `output.fields`, one body, and no loads.
+       read_back.py --packed DIRECTORY — of any packed run; compares only the packed snapshots."""
 import csv
 import re
 import sys
 from pathlib import Path
 
+import h5py
 import meshio
 import numpy as np
 
+try:
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+    from vtkmodules.vtkIOHDF import vtkHDFReader
+except ImportError:
+    vtkHDFReader = None
+
 FIELDS = ["position", "displacement", "velocity", "acceleration", "deformation_gradient", "jacobian", "strain", "stress",
           "pressure", "von_mises", "energy_density", "mass", "volume", "body"]
-directory = Path(sys.argv[1])
+directory = Path(sys.argv[-1])
 checked = 0
 
 
@@ -25,7 +34,82 @@ def same(name, found, expected, scale):
     checked += found.size
 
 
-series = re.findall(r'timestep="([^"]*)" part="0" file="([^"]*)"', (directory / "particles.pvd").read_text())
+def entries(name):
+    """Times and files of a series."""
+    return re.findall(r'timestep="([^"]*)" part="0" file="([^"]*)"', (directory / f"{name}.pvd").read_text())
+
+
+def bits(reader, name, found, expected):
+    """The same type, shape and bits."""
+    global checked
+    found, expected = np.asarray(found), np.asarray(expected)
+    assert (found.dtype, found.shape) == (expected.dtype, expected.shape), f"{reader}: {name}: {found.dtype} {found.shape}"
+    assert found.tobytes() == expected.tobytes(), f"{reader}: {name} differs"
+    checked += found.size
+
+
+def by_h5py(path, step):
+    """Time, points, arrays and cells of a step, by the offsets of the format."""
+    with h5py.File(path) as file:
+        root, steps = file["VTKHDF"], file["VTKHDF/Steps"]
+        assert root.attrs["Type"] == b"UnstructuredGrid" and list(root.attrs["Version"]) == [2, 2], dict(root.attrs)
+        part = steps["PartOffsets"][step]
+        count, cells = root["NumberOfPoints"][part], root["NumberOfCells"][part]
+        rows = lambda array, offset: array[offset:offset + count]
+        # Every part before has one offset more than cells.
+        first = steps["CellOffsets"][step, 0] + part
+        ends = root["Offsets"][first:first + cells + 1]
+        connectivity = rows(root["Connectivity"], steps["ConnectivityIdOffsets"][step, 0])
+        data = {name: rows(root["PointData"][name], steps["PointDataOffsets"][name][step]) for name in root["PointData"]}
+        points = rows(root["Points"], steps["PointOffsets"][step])
+        return steps["Values"][step], points, data, connectivity, ends, steps.attrs["NSteps"]
+
+
+def by_vtk(path, step):
+    """The same by VTK's own reader."""
+    reader = vtkHDFReader()
+    reader.SetFileName(str(path))
+    reader.UpdateInformation()
+    count = reader.GetNumberOfSteps()
+    reader.SetStep(step)
+    reader.Update()
+    grid = reader.GetOutput()
+    arrays = [grid.GetPointData().GetArray(k) for k in range(grid.GetPointData().GetNumberOfArrays())]
+    data = {array.GetName(): vtk_to_numpy(array) for array in arrays}
+    cells = grid.GetCells()
+    ends = vtk_to_numpy(cells.GetOffsetsArray())
+    return reader.GetTimeValue(), vtk_to_numpy(grid.GetPoints().GetData()), data, vtk_to_numpy(cells.GetConnectivityArray()), ends, count
+
+
+def packed(name):
+    """Compares a packed series with its snapshots."""
+    path, series = directory / f"{name}.vtkhdf", entries(name)
+    for reader, read in [("h5py", by_h5py), ("vtk", by_vtk if vtkHDFReader else None)]:
+        if read is None:
+            print(f"skipped: {path.name} read by vtk, which is not installed")
+            continue
+        for step, (time, file) in enumerate(series):
+            mesh = meshio.read(directory / file)
+            found, points, data, connectivity, ends, count = read(path, step)
+            assert (count, found) == (len(series), float(time)), f"{reader}: {count} steps, time {found} of step {step}, {time}"
+            bits(reader, "Points", points, mesh.points)
+            assert set(data) == set(mesh.point_data), f"{reader}: {set(data)}"
+            for array, values in mesh.point_data.items():
+                bits(reader, array, data[array], values)
+            cells = mesh.cells[0].data
+            bits(reader, "connectivity", connectivity, cells.ravel().astype(np.int64))
+            bits(reader, "offsets", ends, np.arange(len(cells) + 1, dtype=np.int64) * cells.shape[1])
+    whole, parts = path.stat().st_size, sum((directory / file).stat().st_size for _, file in series)
+    print(f"{path.name}: {len(series)} snapshots, {whole} bytes, {whole / parts:.3f} of the .vtu files")
+
+
+assert (directory / "particles.vtkhdf").is_file(), "pack the run first: bfree pack DIRECTORY"
+for path in sorted(directory.glob("*.vtkhdf")):
+    packed(path.stem)
+if "--packed" in sys.argv:
+    sys.exit(print(f"{checked} values with the same bits"))
+
+series = entries("particles")
 rows = {float(row["time"]): row for row in csv.DictReader((directory / "history.csv").open())}
 assert len(series) > 3, series
 first = None

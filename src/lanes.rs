@@ -115,6 +115,15 @@ pub(crate) fn widest(work: impl WithLanes) {
     work.run(PORTABLE);
 }
 
+/// The name of the widest instructions of this processor. Those that round a product and a sum once give other bits than the others.
+pub(crate) fn instructions() -> &'static str {
+    #[cfg(target_arch = "x86_64")]
+    if let Some(name) = V4::try_new().map(|_| "AVX-512").or(V3::try_new().map(|_| "AVX2 and FMA")) {
+        return name;
+    }
+    "no vector instructions of its own"
+}
+
 /// A computation `W` on C components in D dimensions.
 pub(crate) struct In<W, const C: usize, const D: usize>(pub W);
 

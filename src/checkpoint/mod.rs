@@ -356,6 +356,11 @@ pub fn unfinished(directory: &Path) -> Option<Unfinished> {
     readable.max_by_key(|one| one.steps).filter(|_| !over)
 }
 
+/// Whether a file of this name is a checkpoint.
+pub(crate) fn is_checkpoint(name: &str) -> bool {
+    NAMES.contains(&name)
+}
+
 /// Removes the checkpoints of an earlier run, so that a new run in the directory is not continued from them.
 ///
 /// # Errors

@@ -1,7 +1,7 @@
 //! Files of an earlier run, or of somebody else, in the directory of a run.
 
 use super::OutputError;
-use super::files::TEMPORARY;
+use super::files::{PROVENANCE, TEMPORARY};
 use super::mark::Mark;
 use super::plot::is_picture;
 use super::pvd::SERIES;
@@ -24,9 +24,26 @@ fn is_series(name: &str) -> bool {
     name.strip_suffix(".pvd").is_some_and(|series| SERIES.contains(&series))
 }
 
-/// Whether a run may write a file of this name.
-fn is_output(name: &str) -> bool {
-    FILES.contains(&name) || is_series(name) || SnapshotMark::default().precedes(name) || is_picture(name)
+/// The part that a file has in the directory of a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Role {
+    /// Written while the scene runs.
+    Result,
+    /// Made of the results, when asked for.
+    Drawn,
+    /// What the run was made of.
+    Provenance,
+}
+
+/// The part of a file of this name; `None` if no run writes such a file.
+pub(crate) fn role(name: &str) -> Option<Role> {
+    let is_packed = name.strip_suffix(".vtkhdf").is_some_and(|series| SERIES.contains(&series));
+    match name {
+        PROVENANCE => Some(Role::Provenance),
+        _ if is_picture(name) || is_packed => Some(Role::Drawn),
+        _ if FILES.contains(&name) || is_series(name) || SnapshotMark::default().precedes(name) => Some(Role::Result),
+        _ => None,
+    }
 }
 
 /// A file that a run would replace, in a directory without a history or report of this program.
@@ -53,7 +70,7 @@ pub fn foreign(directory: &Path) -> Option<PathBuf> {
         return None;
     }
     let names = std::fs::read_dir(directory).ok()?.filter_map(|entry| Some(entry.ok()?.file_name()));
-    names.filter(|name| name.to_str().is_some_and(is_output)).min().map(|name| directory.join(name))
+    names.filter(|name| name.to_str().is_some_and(|name| role(name).is_some())).min().map(|name| directory.join(name))
 }
 
 /// The report in `directory`, if this program wrote it.
@@ -116,7 +133,10 @@ pub(super) fn remove_later_files(directory: &Path, mark: Option<&Mark>) -> Resul
         let name = entry.file_name();
         let Some(name) = name.to_str() else { continue };
         let file = (FILES.contains(&name) || is_series(name)) && !continued(name);
-        if file || is_picture(name) || snapshots.precedes(name) || name.starts_with(TEMPORARY) {
+        // The provenance of a run that goes on stays until it is replaced.
+        let made = role(name) == Some(Role::Drawn) || role(name) == Some(Role::Provenance) && mark.is_none();
+        let is_old = file || made || snapshots.precedes(name);
+        if is_old || name.starts_with(TEMPORARY) {
             std::fs::remove_file(entry.path()).map_err(OutputError::io("remove", &entry.path()))?;
         }
     }

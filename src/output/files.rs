@@ -13,6 +13,9 @@ use tempfile::NamedTempFile;
 /// Prefix of the names of temporary files, which a killed run leaves behind.
 pub(crate) const TEMPORARY: &str = ".bfree-";
 
+/// File name of what a run was made of.
+pub(crate) const PROVENANCE: &str = "provenance.json";
+
 /// Time between flushes. A dying process loses the lines since the last flush.
 const FLUSH_INTERVAL: Duration = Duration::from_millis(50);
 
@@ -49,7 +52,7 @@ pub(crate) fn read_if_there(path: &Path) -> Result<Option<Vec<u8>>, OutputError>
     }
 }
 
-/// Length and checksum of a growing file at one moment.
+/// Length and checksum of a file, or of a growing file at one moment.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Written {
@@ -58,15 +61,21 @@ pub(crate) struct Written {
 }
 
 impl Written {
+    /// Length and checksum of a content.
+    pub(crate) fn of(content: impl Read) -> std::io::Result<Self> {
+        let mut content = CrcReader::new(BufReader::new(content));
+        let bytes = std::io::copy(&mut content, &mut std::io::sink())?;
+        Ok(Self { bytes, crc32: content.crc().sum() })
+    }
+
     /// Checks that the file at `path` begins with this content.
     pub(crate) fn check(&self, path: &Path) -> Result<(), OutputError> {
-        let file = File::open(path).map_err(OutputError::io("continue", path))?;
-        let mut content = CrcReader::new(BufReader::new(file.take(self.bytes)));
-        let bytes = std::io::copy(&mut content, &mut std::io::sink()).map_err(OutputError::io("continue", path))?;
-        if bytes < self.bytes {
+        let found = File::open(path).and_then(|file| Self::of(file.take(self.bytes)));
+        let found = found.map_err(OutputError::io("continue", path))?;
+        if found.bytes < self.bytes {
             return Err(OutputError::content(path, "ends before the place where it was to be continued"));
         }
-        if content.crc().sum() != self.crc32 {
+        if found.crc32 != self.crc32 {
             return Err(OutputError::content(path, "is not what it was when the checkpoint was written"));
         }
         Ok(())

@@ -39,9 +39,9 @@ pub(crate) fn first_entries(path: &Path, count: usize) -> Result<String, OutputE
     Ok(kept.concat())
 }
 
-/// The existing files of the particles in `directory`, in order of time; empty if there is no series.
-pub(crate) fn files(directory: &Path) -> Result<Vec<PathBuf>, OutputError> {
-    let path = file(directory, SERIES[0]);
+/// The existing files of a series in `directory`, in order of time; empty if there is no series.
+pub(crate) fn files(directory: &Path, series: &str) -> Result<Vec<PathBuf>, OutputError> {
+    let path = file(directory, series);
     let Some(series) = read_if_there(&path)? else { return Ok(Vec::new()) };
     let series = String::from_utf8_lossy(&series);
     let names = series.split("file=\"").skip(1).filter_map(|rest| rest.split('"').next());
@@ -83,14 +83,14 @@ mod tests {
     #[test]
     fn a_series_without_files_is_damaged_and_none_is_none() -> Result<(), Box<dyn std::error::Error>> {
         let folder = tempfile::tempdir()?;
-        assert!(files(folder.path())?.is_empty());
+        assert!(files(folder.path(), SERIES[0])?.is_empty());
         let series = folder.path().join("particles.pvd");
         std::fs::write(&series, "<VTKFile>")?;
-        assert!(files(folder.path()).is_err());
+        assert!(files(folder.path(), SERIES[0]).is_err());
         std::fs::write(&series, r#"<DataSet file="a.vtu"/><DataSet part="0" file="b.vtu"/>"#)?;
-        assert!(files(folder.path())?.is_empty());
+        assert!(files(folder.path(), SERIES[0])?.is_empty());
         std::fs::write(folder.path().join("b.vtu"), "")?;
-        assert_eq!(files(folder.path())?, [folder.path().join("b.vtu")]);
+        assert_eq!(files(folder.path(), SERIES[0])?, [folder.path().join("b.vtu")]);
         Ok(())
     }
 }

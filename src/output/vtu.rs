@@ -15,7 +15,7 @@ use std::path::Path;
 const BLOCK: usize = 1 << 16;
 
 /// VTK's types of cells with one point, two and three: vertex, line and triangle.
-const TYPES: [u8; 3] = [1, 3, 5];
+pub(super) const TYPES: [u8; 3] = [1, 3, 5];
 
 /// An array with one tuple for each point.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,6 +34,15 @@ impl Array {
     /// An array with one number for each point.
     pub(crate) fn scalar(name: &str, values: Vec<f64>, is_index: bool) -> Self {
         Self { name: name.to_owned(), components: vec![String::new()], values, is_index }
+    }
+
+    /// The values as a file holds them.
+    pub(super) fn bytes(&self) -> Vec<u8> {
+        if self.is_index {
+            self.values.iter().flat_map(|&x| (x as u32).to_le_bytes()).collect()
+        } else {
+            bytes(&self.values)
+        }
     }
 
     /// The names of the components, as in a table.
@@ -117,7 +126,7 @@ impl Parts {
             self.xml += &format!(r#" ComponentName{k}="{component}""#);
         }
         self.xml += &format!(" format=\"appended\" offset=\"{}\"/>\n", self.data.len());
-        let blocks: Vec<Vec<u8>> = bytes.chunks(BLOCK).map(compressed).collect();
+        let blocks: Vec<Vec<u8>> = bytes.chunks(BLOCK).map(|block| compressed(block, Compression::fast())).collect();
         let header = [blocks.len(), BLOCK, bytes.len() % BLOCK].into_iter().chain(blocks.iter().map(Vec::len));
         self.data.extend(header.flat_map(|word| (word as u64).to_le_bytes()));
         self.data.extend(blocks.iter().flatten());
@@ -134,14 +143,16 @@ impl Parts {
     }
 }
 
-fn compressed(block: &[u8]) -> Vec<u8> {
+/// A block in the format of zlib.
+pub(super) fn compressed(block: &[u8], how: Compression) -> Vec<u8> {
     let mut out = Vec::new();
     // Reading from memory into memory cannot fail.
-    let _ = ZlibEncoder::new(block, Compression::fast()).read_to_end(&mut out);
+    let _ = ZlibEncoder::new(block, how).read_to_end(&mut out);
     out
 }
 
-fn bytes(values: &[f64]) -> Vec<u8> {
+/// The values of an array as bytes.
+pub(super) fn bytes(values: &[f64]) -> Vec<u8> {
     values.iter().flat_map(|x| x.to_le_bytes()).collect()
 }
 
@@ -164,13 +175,9 @@ impl Snapshot {
         let cells = count / corners;
         parts.xml +=
             &format!("</FieldData>\n<Piece NumberOfPoints=\"{count}\" NumberOfCells=\"{cells}\">\n<PointData>\n");
-        for Array { name, components, values, is_index } in &self.arrays {
-            if *is_index {
-                let whole: Vec<u8> = values.iter().flat_map(|&x| (x as u32).to_le_bytes()).collect();
-                parts.array("UInt32", name, components, &whole);
-            } else {
-                parts.array("Float64", name, components, &bytes(values));
-            }
+        for array in &self.arrays {
+            let vtk_type = if array.is_index { "UInt32" } else { "Float64" };
+            parts.array(vtk_type, &array.name, &array.components, &array.bytes());
         }
         parts.xml += "</PointData>\n<Points>\n";
         parts.array("Float64", "Points", &["x", "y", "z"], &bytes(self.points.as_flattened()));

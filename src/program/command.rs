@@ -4,6 +4,8 @@ use super::check_law::CheckLaw;
 use super::failure::{Failure, INTERRUPTED, print, tell};
 use super::new::New;
 use super::newton::Newton;
+use super::pack::pack;
+use super::reproduce::Reproduce;
 use super::run::Run;
 use super::scene_arguments::SceneArguments;
 use crate::causes;
@@ -59,6 +61,14 @@ enum Command {
         #[arg(long, value_parser = ["both", "svg", "png"], default_value = "both", conflicts_with = "movie")]
         format: String,
     },
+    /// Run the scene of earlier results again, with the same flags, and say of every file whether it has the same bits.
+    Reproduce(Reproduce),
+    /// Write all snapshots of a run into one file that ParaView, PyVista and VTK open with its times, particles.vtkhdf. The other series, such
+    /// as obstacles, get a file each. The snapshots themselves stay: pictures and --restart need them.
+    Pack {
+        /// The directory of the run's results.
+        directory: PathBuf,
+    },
     /// Print the JSON schema of scenes.
     Schema,
 }
@@ -82,6 +92,8 @@ pub fn main() -> ExitCode {
             look.formats.retain(|one| format == "both" || format == *one);
             plot(&directory, movie.as_deref(), &look)
         }
+        Command::Reproduce(reproduce) => reproduce.execute(),
+        Command::Pack { directory } => pack(&directory),
         Command::Schema => serde_json::to_string_pretty(&scene::schema()).map_err(Failure::run).and_then(print),
     };
     let (error, code) = match result {

@@ -3,6 +3,7 @@
 use super::directory;
 use super::failure::{Failure, INTERRUPTED, print, tell};
 use super::probes::{Bound, bound_probes};
+use super::provenance::{Command, Provenance};
 use super::scene_arguments::{SceneArguments, what_accuracy_sets};
 use super::steps::{Schedule, Steps};
 use crate::checkpoint::{self, Checkpoints, Identity, Restored};
@@ -17,14 +18,16 @@ use clap::{Args, ValueEnum};
 use serde_json::{Map, Value, json};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
 use signal_hook::flag;
+use std::cell::OnceCell;
+use std::ffi::OsStr;
 use std::num::NonZeroU64;
-use std::path::{Path, PathBuf};
+use std::path::{self, Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 /// `bfree run`.
-#[derive(Args)]
+#[derive(Args, Default)]
 pub struct Run {
     #[command(flatten)]
     scene: SceneArguments,
@@ -119,6 +122,7 @@ impl Run {
         let probes = bound_probes(scene, &simulation);
         let (inputs, warnings) = self.inputs(scene, &simulation, &probes, &directory)?;
         let settings = serde_json::to_value(scene).map_err(Failure::run)?;
+        let provenance = self.provenance(&directory, &settings)?;
         let identity = Identity::new(settings, &simulation.particles).with_files(scene.curve_files());
         let schedule = Schedule::new(&simulation.clock, scene.time.end, self.steps);
         let output = OutputSettings {
@@ -153,6 +157,8 @@ impl Run {
             None => Recorder::start(output, &simulation, reference).map_err(Failure::run)?,
         };
         recorder.count_set_up(set_up);
+        let continued_from = restored.as_ref().and_then(|restored| restored.other_program.clone());
+        Provenance { continued_from, ..provenance }.write(&directory)?;
         let checkpoints = scene.output.checkpoint.map(|every| {
             Checkpoints::new(directory.clone(), identity, self.options(&directory), every, restored.as_ref())
         });
@@ -287,15 +293,42 @@ impl Run {
 
     /// The command line, for the report.
     fn options(&self, directory: &Path) -> Value {
-        json!({
-            "scene": self.scene.scene.display().to_string(),
-            "set": self.scene.overrides,
-            "out": directory.display().to_string(),
-            "until": self.until,
-            "steps": self.steps,
-            "threads": parallel::threads(),
-            "check_tangent": self.check_tangent,
-        })
+        json!(self.command(directory))
+    }
+
+    fn command(&self, directory: &Path) -> Command {
+        let absolute = |path: &PathBuf| path::absolute(path).unwrap_or_else(|_| path.clone()).display().to_string();
+        Command {
+            scene: self.scene.scene.display().to_string(),
+            set: self.scene.overrides.clone(),
+            allow_library: self.scene.libraries.iter().map(absolute).collect(),
+            out: directory.display().to_string(),
+            until: self.until,
+            steps: self.steps,
+            threads: parallel::threads() as u64,
+            check_tangent: self.check_tangent,
+        }
+    }
+
+    fn provenance(&self, directory: &Path, settings: &Value) -> Result<Provenance, Failure> {
+        let text = self.scene.text.get().map(String::as_str).unwrap_or_default();
+        let made = Provenance::new(self.command(directory), self.scene.folder(), text, settings);
+        made.map_err(Failure::system("find the folder of the scene"))
+    }
+
+    /// The run of a provenance again, with results in `out`. A file of results is data, so it allows no library.
+    pub(super) fn again(provenance: &Provenance, out: &Path, libraries: &[PathBuf]) -> Self {
+        let Provenance { command, folder, scene, .. } = provenance;
+        let Command { set: overrides, until, steps, threads, check_tangent, .. } = command.clone();
+        let name = Path::new(&command.scene).file_name().unwrap_or(OsStr::new("scene.json"));
+        let scene = SceneArguments {
+            scene: Path::new(folder).join(name),
+            overrides,
+            libraries: libraries.to_vec(),
+            text: OnceCell::from(scene.clone()),
+        };
+        let (out, threads) = (Some(out.to_owned()), Some(threads));
+        Self { scene, out, until, steps, threads, check_tangent, quiet: true, ..Self::default() }
     }
 }
 

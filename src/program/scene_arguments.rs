@@ -9,11 +9,12 @@ use crate::plan::Plan;
 use crate::scene::{self, Override, Scene, SceneError};
 use crate::simulation::Simulation;
 use clap::Args;
+use std::cell::OnceCell;
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
 /// The scene file, and overrides of its keys.
-#[derive(Args)]
+#[derive(Args, Default)]
 pub struct SceneArguments {
     /// The scene, a JSON file.
     pub scene: PathBuf,
@@ -22,7 +23,10 @@ pub struct SceneArguments {
     pub overrides: Vec<String>,
     /// Let the scene load this shared library, a UMAT for example. Libraries run code, so no scene loads one by itself.
     #[arg(long = "allow-library", value_name = "PATH")]
-    libraries: Vec<PathBuf>,
+    pub libraries: Vec<PathBuf>,
+    /// The text of the scene, once it was read.
+    #[arg(skip)]
+    pub text: OnceCell<String>,
 }
 
 /// A scene that cannot be used.
@@ -38,11 +42,19 @@ impl SceneArguments {
     pub(crate) fn read(&self) -> Result<Scene, Failure> {
         self.libraries.iter().for_each(|path| allow_library(path));
         let overrides: Result<Vec<Override>, _> = self.overrides.iter().map(|text| text.parse()).collect();
-        scene::read_file(&self.scene, &overrides.map_err(Failure::scene)?).map_err(|error| match error {
+        let overrides = overrides.map_err(Failure::scene)?;
+        let text = self.text.get().cloned().map_or_else(|| scene::text(&self.scene), Ok);
+        let read = text.and_then(|text| scene::read(self.text.get_or_init(|| text), &overrides));
+        read.map_err(|error| match error {
             // `File` names the file already, and `Override` concerns an option: neither needs the path of the scene.
             SceneError::File { .. } | SceneError::Override(_) => Failure::scene(error),
             error => self.unusable(error),
         })
+    }
+
+    /// The folder of the scene, in which the files that it names are looked for.
+    pub(crate) fn folder(&self) -> &Path {
+        self.scene.parent().unwrap_or(Path::new("."))
     }
 
     /// Adds the path of the scene to an error.
@@ -53,8 +65,7 @@ impl SceneArguments {
     /// Builds the simulation at t = 0. Too little memory for its particles is an error.
     pub(crate) fn build<const D: usize>(&self, scene: &Scene) -> Result<Simulation<D>, Failure> {
         let memory = memory::available().unwrap_or(u64::MAX);
-        let folder = self.scene.parent().unwrap_or(Path::new("."));
-        scene.build_within::<D>(folder, memory).map_err(|error| self.unusable(error))
+        scene.build_within::<D>(self.folder(), memory).map_err(|error| self.unusable(error))
     }
 
     /// The plan of a run: its terms and arrays. Too little memory for the arrays is an error.

@@ -44,6 +44,7 @@ pub use build_error::BuildError;
 pub use file::FileError;
 pub use filling::BodyUse;
 pub use overrides::{Override, OverrideError};
+pub(crate) use read::text;
 pub use read::{MAX_BYTES, SceneError, read, read_file};
 
 use crate::approximation;

@@ -63,6 +63,11 @@ pub enum SceneError {
 /// # Errors
 /// The errors of [`read`], and a file that cannot be read or is not UTF-8.
 pub fn read_file(path: &Path, overrides: &[Override]) -> Result<Scene, SceneError> {
+    read(&text(path)?, overrides)
+}
+
+/// The text of a scene file.
+pub(crate) fn text(path: &Path) -> Result<String, SceneError> {
     let failed = |source| SceneError::File { path: path.to_owned(), source };
     let about = std::fs::metadata(path).map_err(failed)?;
     // Standard input, below /dev, is open already.
@@ -76,12 +81,11 @@ pub fn read_file(path: &Path, overrides: &[Override]) -> Result<Scene, SceneErro
     if bytes.len() as u64 > MAX_BYTES {
         return Err(SceneError::TooLong(about.len().max(bytes.len() as u64)));
     }
-    let text = std::str::from_utf8(&bytes).map_err(|wrong| {
-        let byte = wrong.valid_up_to();
+    String::from_utf8(bytes).map_err(|wrong| {
+        let (byte, bytes) = (wrong.utf8_error().valid_up_to(), wrong.as_bytes());
         let line = 1 + bytes.iter().take(byte).filter(|&&byte| byte == b'\n').count();
         SceneError::NotText { byte, line }
-    })?;
-    read(text, overrides)
+    })
 }
 
 /// Reads and checks a scene, with `overrides` applied in order.

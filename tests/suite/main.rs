@@ -38,6 +38,7 @@ mod plasticity;
 mod points;
 mod program;
 mod rebound;
+mod reproduce;
 mod restart;
 mod runs;
 mod scenes;

@@ -34,13 +34,13 @@ fn done(scene: &str, directory: &Path, arguments: &[&[&str]]) -> Result<String, 
     Ok(text)
 }
 
-/// All files of a run but its checkpoints. The report lacks what may differ: seconds, and the place and extent of the first run.
+/// All files of a run but its checkpoints and its provenance. The report lacks what may differ: seconds, and the place and extent of the first run.
 fn files(directory: &Path) -> Result<BTreeMap<String, Vec<u8>>, Failure> {
     let mut files = BTreeMap::new();
     for entry in std::fs::read_dir(directory)? {
         let path = entry?.path();
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        if name.starts_with("checkpoint") {
+        if name.starts_with("checkpoint") || name == "provenance.json" {
             continue;
         }
         let mut content = std::fs::read(&path)?;

@@ -28,10 +28,11 @@ pub use convergence::newton_norms;
 pub use picture::Picture;
 pub use view::View;
 
+use super::OutputError;
 use super::files::write_atomically;
+use super::pvd::{self, SERIES};
 use super::snapshots::beside;
 use super::vtu::Snapshot;
-use super::{OutputError, pvd};
 use axes::extremes;
 pub(super) use axes::rounded;
 use chart::{Heading, Line, Panel};
@@ -130,7 +131,7 @@ pub(crate) fn is_picture(file: &str) -> bool {
 pub fn plot_run(directory: &Path, look: &Look) -> Result<Vec<PathBuf>, OutputError> {
     let report = run_report::read(directory)?;
     let pictures = charts(directory, &report)?;
-    let snapshots = pvd::files(directory)?;
+    let snapshots = pvd::files(directory, SERIES[0])?;
     let recording = Recording::read(&snapshots)?;
     // The particles are not on the page: the player shows them.
     let mut particles = None;
@@ -280,7 +281,7 @@ fn momentum(history: &Columns, report: &Value) -> Result<Option<Panel>, OutputEr
 /// # Errors
 /// There are no snapshots, or a snapshot is damaged. The snapshots do not hold the field of `look`. The operating system refuses.
 pub fn plot_frames(directory: &Path, frames: &Path, look: &Look) -> Result<Vec<PathBuf>, OutputError> {
-    let snapshots = pvd::files(directory)?;
+    let snapshots = pvd::files(directory, SERIES[0])?;
     let none = || OutputError::NoSnapshots(directory.to_owned());
     let recording = Recording::read(&snapshots)?.ok_or_else(none)?;
     std::fs::create_dir_all(frames).map_err(OutputError::io("create", frames))?;
