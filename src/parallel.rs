@@ -70,7 +70,7 @@ pub fn record<R>(f: impl FnOnce() -> R) -> (R, Vec<Region>) {
 fn run(place: &'static Location<'static>, count: usize, task: &(dyn Fn(usize) + Sync)) {
     if records() {
         record_region(place, count, task);
-    } else if count > 1 && several() {
+    } else if count > 1 {
         (0..count).into_par_iter().for_each(task);
     } else {
         (0..count).for_each(task);
@@ -151,6 +151,9 @@ pub(crate) fn map<R: Send>(count: usize, f: &(dyn Fn(usize) -> R + Sync)) -> Vec
 /// `f(part)` of every part.
 #[track_caller]
 pub(crate) fn collect<P: Send, R: Send>(parts: impl Iterator<Item = P>, f: &(dyn Fn(P) -> R + Sync)) -> Vec<R> {
+    if !several() {
+        return parts.map(f).collect();
+    }
     // A part, and then its result. Each is locked once.
     let tasks: Vec<_> = parts.map(|part| Mutex::new((Some(part), None))).collect();
     run(Location::caller(), tasks.len(), &|number| {

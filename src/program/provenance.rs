@@ -93,7 +93,8 @@ impl Provenance {
             made_by: Maker::here(),
             continued_from: None,
             bodies: bodies.into_iter().flatten().filter_map(|body| body["name"].as_str().map(str::to_owned)).collect(),
-            folder: std::path::absolute(folder)?.display().to_string(),
+            // A scene that is named without its folder has the folder "".
+            folder: std::path::absolute(Path::new(".").join(folder).components().as_path())?.display().to_string(),
             files: texts.into_iter().filter_map(file).collect(),
             checksum: Written::of(scene.as_bytes())?,
             scene: scene.to_owned(),

@@ -198,7 +198,8 @@ fn a_state_that_is_no_number_is_refused_and_leaves_the_last_one() -> Result<(), 
         assert!(simulation.clock.steps() < 200, "no step was refused");
     };
     assert!(error.to_string().contains("not finite"), "{error}");
-    assert_eq!(simulation.particles, before);
+    // The step that failed may have sorted the particles.
+    assert_eq!(simulation.particles.by_id(), before.by_id());
     assert!(before.memory.iter().all(|one| one.is_finite()));
     Ok(())
 }
