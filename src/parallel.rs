@@ -10,6 +10,9 @@ use std::panic::Location;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
+/// The most threads of a run.
+pub(crate) const MOST_THREADS: u64 = 1024;
+
 /// Sets the number of threads. Without this call there are as many threads as cores.
 ///
 /// # Errors

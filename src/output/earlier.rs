@@ -79,6 +79,11 @@ fn report(directory: &Path) -> Option<Value> {
     report["program"].as_str().is_some_and(|program| program.starts_with("bfree ")).then_some(report)
 }
 
+/// How the run in `directory` ended, see [`Held::outcome`].
+pub(crate) fn outcome(directory: &Path) -> Option<String> {
+    report(directory)?["outcome"].as_str().map(str::to_owned)
+}
+
 /// The results of an earlier run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Held {
@@ -105,8 +110,7 @@ pub struct Held {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn held(directory: &Path) -> Option<Held> {
-    let report = report(directory).unwrap_or_default();
-    let outcome = report["outcome"].as_str().map(str::to_owned);
+    let (report, outcome) = (report(directory).unwrap_or_default(), outcome(directory));
     let reported = || Some((report["counts"]["steps"].as_u64()?, report["time"].as_f64()?));
     let (steps, time) = last_row(&directory.join(HISTORY)).or_else(reported)?;
     let finished = outcome.as_deref() == Some("finished");

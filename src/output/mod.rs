@@ -50,7 +50,7 @@ pub mod vtu;
 pub mod warnings;
 
 pub use earlier::{Held, foreign, held};
-pub(crate) use earlier::{Role, role};
+pub(crate) use earlier::{Role, outcome, role};
 pub use error::OutputError;
 pub use mark::Mark;
 pub use probes::{Place, Probe, nearest};

@@ -41,6 +41,11 @@ pub(crate) fn first_entries(path: &Path, count: usize) -> Result<String, OutputE
 
 /// The existing files of a series in `directory`, in order of time; empty if there is no series.
 pub(crate) fn files(directory: &Path, series: &str) -> Result<Vec<PathBuf>, OutputError> {
+    Ok(listed(directory, series)?.into_iter().filter(|file| file.is_file()).collect())
+}
+
+/// All files of a series, also those that are not there any more.
+pub(super) fn listed(directory: &Path, series: &str) -> Result<Vec<PathBuf>, OutputError> {
     let path = file(directory, series);
     let Some(series) = read_if_there(&path)? else { return Ok(Vec::new()) };
     let series = String::from_utf8_lossy(&series);
@@ -49,7 +54,7 @@ pub(crate) fn files(directory: &Path, series: &str) -> Result<Vec<PathBuf>, Outp
     if files.is_empty() {
         return Err(OutputError::content(&path, "lists no snapshots"));
     }
-    Ok(files.into_iter().filter(|file| file.is_file()).collect())
+    Ok(files)
 }
 
 #[cfg(test)]

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 const CHUNK: usize = 1 << 15;
 
 /// Writes `particles.vtkhdf` of the snapshots in the directory of a run, and a file of every other series beside it. `bodies` are the names
-/// of the bodies. Returns the files written, and the number of snapshots in each.
+/// of the bodies. Returns the files written, and for each the snapshots in it and those that are missing.
 ///
 /// ```
 /// use bfree::output::{OutputError, pack};
@@ -27,17 +27,18 @@ const CHUNK: usize = 1 << 15;
 ///
 /// # Errors
 /// There are no snapshots, a snapshot is damaged or has other fields than the first, or the operating system refuses.
-pub fn pack(directory: &Path, bodies: &[String]) -> std::result::Result<Vec<(PathBuf, usize)>, OutputError> {
+pub fn pack(directory: &Path, bodies: &[String]) -> std::result::Result<Vec<(PathBuf, [usize; 2])>, OutputError> {
     let mut written = Vec::new();
     for series in SERIES {
-        let files = pvd::files(directory, series)?;
+        let (files, missing): (Vec<_>, Vec<_>) =
+            pvd::listed(directory, series)?.into_iter().partition(|path| path.is_file());
         let counts = files.iter().map(|path| Ok(Snapshot::read(path)?.points.len()));
         let rows = counts.collect::<std::result::Result<Vec<_>, OutputError>>()?.into_iter().max();
         // Surfaces that may touch may have no points.
         if let Some(rows) = rows.filter(|rows| *rows > 0) {
             let path = directory.join(format!("{series}.vtkhdf"));
             write_atomically(&path, |out| write(out, rows, &files, bodies))?;
-            written.push((path, files.len()));
+            written.push((path, [files.len(), missing.len()]));
         }
     }
     if written.is_empty() { Err(OutputError::NoSnapshots(directory.to_owned())) } else { Ok(written) }

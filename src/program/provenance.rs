@@ -3,6 +3,7 @@
 use super::failure::Failure;
 use crate::lanes;
 use crate::output::files::{PROVENANCE, Written, write_atomically};
+use crate::parallel::MOST_THREADS;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -117,6 +118,11 @@ impl Provenance {
         })?;
         let wrong = |error| Failure::scene(format!("{} is no provenance of bfree: {error}", path.display()));
         let read: Self = serde_json::from_str(&text).map_err(wrong)?;
+        let threads = read.command.threads;
+        if !(1..=MOST_THREADS).contains(&threads) {
+            let allowed = format!("must be from 1 to {MOST_THREADS}");
+            return Err(Failure::scene(format!("{}: command.threads = {threads}; {allowed}", path.display())));
+        }
         if Written::of(read.scene.as_bytes()).ok() != Some(read.checksum) {
             return Err(Failure::scene(format!(
                 "{}: its scene is not what was run: its checksum differs",

@@ -28,19 +28,27 @@ impl Reproduce {
     /// Runs the scene again, and says of every file whether it has the same bits. Another file is an error.
     pub(crate) fn execute(&self) -> Result<(), Failure> {
         let directory = match self.results.parent() {
-            Some(parent) if self.results.is_file() => parent,
+            // A file that is named without its folder has the folder "".
+            Some(parent) if self.results.is_file() => &Path::new(".").join(parent),
             _ => &self.results,
         };
         let then = Provenance::read(directory)?;
-        let ended = output::held(directory).and_then(|held| held.outcome).filter(|outcome| outcome != "interrupted");
+        let ended = output::outcome(directory).filter(|outcome| outcome != "interrupted");
         if ended.is_none() {
             let what = "holds a run that did not end: continue it by --restart first, where it has a checkpoint";
             return Err(Failure::scene(format!("{} {what}", directory.display())));
         }
+        // Nothing that lies there already can then be taken for a result of the new run.
+        if self.out.exists() && !names(&self.out)?.is_empty() {
+            let what = "holds files: give a new or an empty directory by --out";
+            return Err(Failure::scene(format!("{} {what}", self.out.display())));
+        }
         then.tell_changes();
         match Run::again(&then, &self.out, &self.libraries).execute() {
-            // A run that failed is compared, too.
-            Err(Failure::Run(error)) => tell(format_args!("the run failed: {}", causes::on_one_line(&*error))),
+            // A run that failed is compared, too, if it has a report.
+            Err(Failure::Run(error)) if output::outcome(&self.out).is_some() => {
+                tell(format_args!("the run failed: {}", causes::on_one_line(&*error)))
+            }
             result => result?,
         }
         let names = names(directory)?.into_iter().chain(names(&self.out)?).collect::<BTreeSet<_>>();

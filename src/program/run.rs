@@ -42,7 +42,7 @@ pub struct Run {
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(0, MAX_STEPS as u64))]
     steps: Option<u64>,
     /// Threads, 1 to 1024 [default: all cores]. Results are bitwise identical for any number of threads.
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1, 1024))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1, parallel::MOST_THREADS))]
     threads: Option<u64>,
     /// Compare the tangent with dual numbers every EVERY steps, and stop if they differ.
     #[arg(long, value_name = "EVERY", num_args = 0..=1, default_missing_value = "1", allow_negative_numbers = true,

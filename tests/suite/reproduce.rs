@@ -44,6 +44,10 @@ fn results_run_again_to_the_same_bits_and_a_changed_file_is_told() -> Result<(),
     }
     assert!(says(&told, "same", "report.json but for seconds and command") && told.contains("0 have not"), "{told}");
     assert!(told.contains("not compared  checkpoint_0.bfree: it holds seconds"), "{told}");
+    // A file may be named without its folder.
+    let mut here = Command::new(env!("CARGO_BIN_EXE_bfree"));
+    let (code, told, text) = said(here.current_dir(&first).args(["reproduce", "history.csv", "--out", "../here"]))?;
+    assert_eq!((code, text.as_str()), (Some(0), ""), "{told}");
     // A changed digit is found, and so is a missing file.
     let mut row = fs::read_to_string(first.join("history.csv"))?;
     let last = row.trim_end().len() - 1;
@@ -75,7 +79,10 @@ fn results_that_cannot_be_run_again_are_refused() -> Result<(), Failure> {
     fs::write(&file, good.replace("\"program\": \"bfree ", "\"program\": \"bfree 0."))?;
     let (code, _, text) = again()?;
     assert!(code == Some(0) && text.contains("warning: the run was made by bfree 0."), "{text}");
+    let (code, _, text) = again()?;
+    assert!(code == Some(2) && text.contains("holds files"), "{text}");
     for (text, word) in [
+        (good.replacen("\"threads\": 1", "\"threads\": 0", 1), "must be from 1 to 1024"),
         (good.replacen("density", "densiti", 1), "its checksum differs"),
         (good.replacen("\"until\"", "\"untill\"", 1), "unknown field `untill`"),
         (String::new(), "no provenance"),
@@ -98,6 +105,18 @@ fn results_that_cannot_be_run_again_are_refused() -> Result<(), Failure> {
 }
 
 #[test]
+fn a_run_that_fails_in_its_first_step_fails_again() -> Result<(), Failure> {
+    let folder = tempfile::tempdir()?;
+    let (scene, out) = (Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/rebound.json"), folder.path().join("out"));
+    let flags = ["run", "--quiet", "--set", "bodies.0.velocity=[5000,0]"];
+    let (code, _, text) = program(&flags, &[&scene, "--out".as_ref(), &out])?;
+    assert!(code == Some(1) && out.join("report.json").is_file(), "{text}");
+    let (code, told, text) = program(&["reproduce"], &[&out, "--out".as_ref(), &folder.path().join("again")])?;
+    assert!(code == Some(0) && text.contains("the run failed") && told.contains("0 have not"), "{told}{text}");
+    Ok(())
+}
+
+#[test]
 fn snapshots_are_packed_into_one_file_with_the_same_bytes_each_time() -> Result<(), Failure> {
     let folder = tempfile::tempdir()?;
     let first = folder.path().join("first");
@@ -111,6 +130,13 @@ fn snapshots_are_packed_into_one_file_with_the_same_bytes_each_time() -> Result<
     let (one, two) = (pack()?, pack()?);
     assert!(one == two && one.starts_with(b"\x89HDF\r\n\x1a\n"));
     assert_eq!(one.get(44..52), Some(&(one.len() as u64).to_le_bytes()[..]), "the end of the file");
+    // A snapshot that is missing is told.
+    let (here, away) = (first.join("particles_000003.vtu"), folder.path().join("away.vtu"));
+    fs::rename(&here, &away)?;
+    let (code, told, _) = program(&["pack"], &[&first])?;
+    assert!(code == Some(0) && told.contains("6 snapshots; 1 of the run are not there any more"), "{told}");
+    fs::rename(&away, &here)?;
+    assert!(pack()? == one);
     // A damaged snapshot leaves the packed file as it was.
     fs::write(first.join("particles_000002.vtu"), "")?;
     let (code, _, text) = program(&["pack"], &[&first])?;
