@@ -27,11 +27,11 @@ fn is_series(name: &str) -> bool {
 /// The part that a file has in the directory of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Role {
-    /// Written while the scene runs.
+    /// The run writes the file step by step, or at its end.
     Result,
-    /// Made of the results, when asked for.
+    /// A picture, a page or a packed file, which a command makes from the results.
     Drawn,
-    /// What the run was made of.
+    /// The file names the scene, the program and the flags of the run.
     Provenance,
 }
 

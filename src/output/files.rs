@@ -13,7 +13,7 @@ use tempfile::NamedTempFile;
 /// Prefix of the names of temporary files, which a killed run leaves behind.
 pub(crate) const TEMPORARY: &str = ".bfree-";
 
-/// File name of what a run was made of.
+/// Name of the file with the scene, the program and the flags of a run.
 pub(crate) const PROVENANCE: &str = "provenance.json";
 
 /// Time between flushes. A dying process loses the lines since the last flush.

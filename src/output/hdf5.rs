@@ -8,7 +8,7 @@ use super::vtu::compressed;
 use flate2::Compression;
 use std::io::{Error, Result, Seek, SeekFrom, Write};
 
-/// The address of what is not there.
+/// The address that stands for a missing object.
 const NOWHERE: u64 = u64::MAX;
 
 /// Bytes of the superblock.
@@ -36,9 +36,9 @@ impl Type {
     }
 
     fn message(self) -> Vec<u8> {
-        // Class and version, three bytes of flags, the size, and for numbers the offset and the count of their bits.
+        // The message has class and version, three bytes of flags, and the size. For numbers, the offset and the count of their bits follow.
         let (head, bits): ([u8; 4], &[u8]) = match self {
-            // Sign at bit 63, exponent of 11 bits from bit 52 with the bias 1023, mantissa of 52 bits from bit 0 without its leading 1.
+            // The sign is bit 63. The exponent has 11 bits from bit 52 on and the bias 1023. The mantissa has 52 bits without its leading 1.
             Self::F64 => ([0x11, 0x20, 63, 0], &[0, 0, 64, 0, 52, 11, 0, 52, 0xff, 0x03, 0, 0]),
             Self::I64 => ([0x10, 0x08, 0, 0], &[0, 0, 64, 0]),
             Self::U32 => ([0x10, 0, 0, 0], &[0, 0, 32, 0]),
@@ -63,7 +63,7 @@ pub(super) fn whole(numbers: impl IntoIterator<Item = usize>) -> Vec<u8> {
 #[derive(Debug)]
 pub(super) struct Chunked {
     numbers: Type,
-    /// Rows of a chunk.
+    /// The number of rows in a chunk.
     rows: usize,
     columns: usize,
     /// Address and bytes of each chunk, the chunks of the first rows first.
@@ -83,7 +83,7 @@ impl Chunked {
         self.columns * self.numbers.size() as usize
     }
 
-    /// The extents of so many rows.
+    /// The extents of an array with this number of `rows`.
     fn extents(&self, rows: usize) -> Vec<u64> {
         let extents = [rows as u64, self.columns as u64];
         extents.into_iter().take(self.columns.min(2)).collect()
@@ -116,38 +116,40 @@ impl<W: Write + Seek> Writer<W> {
     }
 
     /// Adds rows to a dataset, and writes its chunks that are full.
-    pub(super) fn add(&mut self, to: &mut Chunked, bytes: &[u8]) -> Result<()> {
-        to.held.extend(bytes);
-        if to.held.len() < to.rows * to.width() { Ok(()) } else { self.flush(to) }
+    pub(super) fn add(&mut self, array: &mut Chunked, bytes: &[u8]) -> Result<()> {
+        array.held.extend(bytes);
+        if array.held.len() < array.rows * array.width() { Ok(()) } else { self.flush(array) }
     }
 
     /// Writes the rows that fill no chunk yet, and zeros after them. All datasets must be flushed before the first is written.
-    pub(super) fn flush(&mut self, to: &mut Chunked) -> Result<()> {
-        let size = to.numbers.size() as usize;
+    pub(super) fn flush(&mut self, array: &mut Chunked) -> Result<()> {
+        let size = array.numbers.size() as usize;
         // The format counts bytes of a chunk in 32 bits, and chunks of a node in 16.
-        small::<u32>(to.rows * size)?;
-        let mut held = std::mem::take(&mut to.held);
-        held.resize(held.len().next_multiple_of(to.rows * to.width()), 0);
-        for block in held.chunks(to.rows * to.width()) {
-            for column in 0..to.columns {
-                let plane = |byte: usize| block.iter().skip(column * size + byte).step_by(to.width()).copied();
+        small::<u32>(array.rows * size)?;
+        let mut held = std::mem::take(&mut array.held);
+        held.resize(held.len().next_multiple_of(array.rows * array.width()), 0);
+        for block in held.chunks(array.rows * array.width()) {
+            for column in 0..array.columns {
+                let plane = |byte: usize| block.iter().skip(column * size + byte).step_by(array.width()).copied();
                 let shuffled: Vec<u8> = (0..size).flat_map(plane).collect();
                 let packed = compressed(&shuffled, Compression::default());
-                to.chunks.push((self.put(&packed)?, small(packed.len())?));
+                array.chunks.push((self.put(&packed)?, small(packed.len())?));
             }
         }
-        small::<u16>(to.chunks.len())?;
-        self.half_node = self.half_node.max(small(to.chunks.len().div_ceil(2))?);
+        small::<u16>(array.chunks.len())?;
+        self.half_node = self.half_node.max(small(array.chunks.len().div_ceil(2))?);
         Ok(())
     }
 
     /// Writes a dataset of chunks.
-    pub(super) fn chunked(&mut self, of: &Chunked, attributes: &[Attribute]) -> Result<u64> {
-        let (chunk, count) = (of.extents(of.rows), of.chunks.len());
-        // The size of a chunk, the filters left out, and its place along every axis and in the bytes of a number.
+    pub(super) fn chunked(&mut self, array: &Chunked, attributes: &[Attribute]) -> Result<u64> {
+        let (chunk, count) = (array.extents(array.rows), array.chunks.len());
+        // A key has the size of a chunk, a mask of the filters left out, and the position of the chunk along every axis and in a number.
         let key = |size: u32, k: usize| {
-            let place =
-                [(k / of.columns * of.rows) as u64, (k % of.columns) as u64].into_iter().take(chunk.len()).chain([0]);
+            let place = [(k / array.columns * array.rows) as u64, (k % array.columns) as u64]
+                .into_iter()
+                .take(chunk.len())
+                .chain([0]);
             [size, 0]
                 .into_iter()
                 .flat_map(u32::to_le_bytes)
@@ -155,7 +157,7 @@ impl<W: Write + Seek> Writer<W> {
                 .collect::<Vec<u8>>()
         };
         let mut tree = [&b"TREE\x01\0"[..], &small::<u16>(count)?.to_le_bytes(), &[0xff; 16]].concat();
-        for (k, &(address, size)) in of.chunks.iter().enumerate() {
+        for (k, &(address, size)) in array.chunks.iter().enumerate() {
             tree.extend(key(size, k));
             tree.extend(address.to_le_bytes());
         }
@@ -164,17 +166,17 @@ impl<W: Write + Seek> Writer<W> {
         tree.resize(tree.len() + (2 * usize::from(self.half_node) - count) * (last.len() + 8), 0);
         let mut layout = vec![3, 2, small(chunk.len() + 1)?];
         layout.extend(self.put(&tree)?.to_le_bytes());
-        for extent in [of.rows, 1].into_iter().take(chunk.len()).chain([of.numbers.size() as usize]) {
+        for extent in [array.rows, 1].into_iter().take(chunk.len()).chain([array.numbers.size() as usize]) {
             layout.extend(small::<u32>(extent)?.to_le_bytes());
         }
-        let dims = of.extents(count / of.columns * of.rows);
-        // Version 2, two filters: shuffle (2) by the size of a number, then deflate (1) with its level. Each has one value.
+        let dims = array.extents(count / array.columns * array.rows);
+        // The message has version 2 and two filters: shuffle (2) by the size of a number, then deflate (1) with its level.
         let mut pipeline = vec![2, 2];
-        for (filter, value) in [(2, of.numbers.size()), (1, Compression::default().level())] {
+        for (filter, value) in [(2, array.numbers.size()), (1, Compression::default().level())] {
             pipeline.extend([filter, 0, 0, 0, 1, 0]);
             pipeline.extend(value.to_le_bytes());
         }
-        self.dataset(of.numbers, &dims, vec![(0x08, layout), (0x0b, pipeline)], attributes)
+        self.dataset(array.numbers, &dims, vec![(0x08, layout), (0x0b, pipeline)], attributes)
     }
 
     /// Writes a dataset at once. Its bytes must fill `dims`.
@@ -195,7 +197,7 @@ impl<W: Write + Seek> Writer<W> {
         storage: Vec<(u16, Vec<u8>)>,
         attributes: &[Attribute],
     ) -> Result<u64> {
-        // The third is the fill value: none is written.
+        // The third message says that no fill value is written.
         let about = [(0x01, space(dims)), (0x03, numbers.message()), (0x05, vec![2, 2, 1, 0])];
         self.object(about.into_iter().chain(storage), attributes)
     }
@@ -204,7 +206,7 @@ impl<W: Write + Seek> Writer<W> {
     pub(super) fn group(&mut self, links: &[(&str, u64)], attributes: &[Attribute]) -> Result<u64> {
         let mut messages = vec![(0x02, [&[0, 0], &[0xff; 16][..]].concat())];
         for (name, address) in links {
-            // Version 1, with a character set and two bytes for the length of the name; the set is UTF-8.
+            // The link has version 1, the character set UTF-8, and two bytes for the length of the name.
             let head = [&[1, 0x11, 1], &small::<u16>(name.len())?.to_le_bytes()[..]].concat();
             messages.push((0x06, [&head, name.as_bytes(), &address.to_le_bytes()].concat()));
         }
@@ -228,10 +230,10 @@ impl<W: Write + Seek> Writer<W> {
 
     /// Ends the file, whose root group is at `root`.
     pub(super) fn finish(mut self, root: u64) -> Result<()> {
-        // Versions, bytes of an address and of a length, and the sizes of nodes, of which only the last is used.
+        // The block begins with versions, bytes of an address and of a length, and sizes of nodes. Readers use only the last size.
         let mut block = b"\x89HDF\r\n\x1a\n\x01\0\0\0\0\x08\x08\0".to_vec();
         block.extend([4, 16, 0, 0, self.half_node, 0].map(u16::to_le_bytes).concat());
-        // Base, free space, end, driver; then the root group: its name, its header, and nothing cached.
+        // Then come the addresses of base, free space, end and driver, and the root group: its name, its header, and nothing cached.
         block.extend([0, NOWHERE, self.end, NOWHERE, 0, root, 0, 0, 0].map(u64::to_le_bytes).concat());
         self.out.seek(SeekFrom::Start(0))?;
         self.out.write_all(&block)

@@ -48,20 +48,20 @@ pub fn pack(directory: &Path, bodies: &[String]) -> std::result::Result<Vec<(Pat
 struct Column {
     name: String,
     chunks: Chunked,
-    /// The rows before its values at each time.
+    /// The row at which the values of each time begin.
     offsets: Vec<usize>,
     last: Vec<u8>,
 }
 
 impl Column {
-    /// A column for snapshots of so many `rows`.
-    fn of(array: &Array, rows: usize) -> Self {
+    /// An empty column for snapshots with this number of `rows`.
+    fn new(array: &Array, rows: usize) -> Self {
         let numbers = if array.is_index { Type::U32 } else { Type::F64 };
         let chunks = Chunked::new(numbers, rows * CHUNK.div_ceil(rows), array.components.len());
         Self { name: array.name.clone(), chunks, offsets: Vec::new(), last: Vec::new() }
     }
 
-    /// What must be the same in all snapshots.
+    /// The name and the bytes of a row, which all snapshots must share.
     fn kind(&self) -> (&str, usize) {
         (&self.name, self.chunks.width())
     }
@@ -99,9 +99,9 @@ impl Series {
     fn add(&mut self, file: &mut Writer<impl Write + Seek>, path: &Path) -> Result<()> {
         let Snapshot { time, points, mut arrays, corners, .. } = Snapshot::read(path).map_err(Error::other)?;
         arrays.push(Array { components: vec![String::new(); 3], ..Array::scalar("Points", points.concat(), false) });
-        let columns: Vec<_> = arrays.iter().map(|array| Column::of(array, self.rows)).collect();
+        let columns: Vec<_> = arrays.iter().map(|array| Column::new(array, self.rows)).collect();
         if self.times.is_empty() {
-            self.columns = arrays.iter().map(|array| Column::of(array, self.rows)).collect();
+            self.columns = arrays.iter().map(|array| Column::new(array, self.rows)).collect();
         }
         let is_same = columns.iter().map(Column::kind).eq(self.columns.iter().map(Column::kind));
         if !is_same || !columns.iter().all(|column| is_link(&column.name)) {
@@ -187,7 +187,7 @@ fn steps(file: &mut Writer<impl Write + Seek>, series: &Series, cells: usize, bo
         ("NumberOfParts", file.whole(&[count], vec![1; times.len()])?),
         ("PartOffsets", file.whole(&[count], parts.iter().copied())?),
         ("PointOffsets", points),
-        // From here on, and as many ends more as there are parts before, readers take the ends of the cells.
+        // Readers add the number of earlier parts to this offset: every part has one more end than cells.
         ("CellOffsets", file.whole(&[count, 1], parts.iter().map(|part| part * cells))?),
         ("ConnectivityIdOffsets", file.whole(&[count, 1], vec![0; times.len()])?),
         ("PointDataOffsets", file.group(&offsets, &[])?),

@@ -1,4 +1,5 @@
-//! `provenance.json`: what a run was made of, beside its results, so that `bfree reproduce` can run it again.
+//! `provenance.json` lies beside the results of a run. The file holds the scene, the program and the flags, so that `bfree reproduce` can run the
+//! scene again.
 
 use super::failure::Failure;
 use crate::lanes;
@@ -125,7 +126,7 @@ impl Provenance {
         }
         if Written::of(read.scene.as_bytes()).ok() != Some(read.checksum) {
             return Err(Failure::scene(format!(
-                "{}: its scene is not what was run: its checksum differs",
+                "{}: the scene differs from its checksum, so it is not the one that was run",
                 path.display()
             )));
         }

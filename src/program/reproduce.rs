@@ -1,4 +1,4 @@
-//! `bfree reproduce`: runs a scene again as its results say, and compares the files.
+//! `bfree reproduce` runs the scene of earlier results again, and compares the files.
 
 use super::failure::{Failure, print, tell};
 use super::provenance::{Maker, Provenance, of_file};
@@ -69,7 +69,7 @@ impl Reproduce {
 }
 
 impl Provenance {
-    /// Says what is not as it was when the run was made.
+    /// Warns of another program, another machine and changed files.
     fn tell_changes(&self) {
         let (then, now) = (&self.made_by, Maker::here());
         if *then != now {
@@ -84,7 +84,7 @@ impl Provenance {
         }
         for (name, written) in &self.files {
             if of_file(&Path::new(&self.folder).join(name)).ok() != Some(*written) {
-                tell(format_args!("warning: the file {name} in {} is not what it was", self.folder));
+                tell(format_args!("warning: the file {name} in {} has changed since the run", self.folder));
             }
         }
     }

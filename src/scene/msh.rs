@@ -1,6 +1,6 @@
 //! Meshes of Gmsh: files in the format MSH 4.1, as text and binary.
 //!
-//! No room is made for entries that are announced: each entry that is kept has taken bytes of the file.
+//! Counts in a file reserve no memory, so a wrong count cannot exhaust it: each entry that is kept has taken bytes of the file.
 
 use super::file::FileError;
 use crate::problems::LARGEST;
@@ -44,12 +44,12 @@ pub(super) struct Block {
 impl Mesh {
     /// The mesh in the bytes of a file.
     pub(super) fn read(bytes: &[u8]) -> Result<Self, FileError> {
-        let (mut mesh, mut file) = (Self::default(), Reader { bytes, at: 0, binary: false });
+        let (mut mesh, mut file) = (Self::default(), Reader { bytes, position: 0, binary: false });
         file.format()?;
         loop {
             let section = file.line();
             // Binary numbers begin behind the end of the line.
-            file.at += usize::from(file.binary);
+            file.position += usize::from(file.binary);
             match section.as_str() {
                 "" => return Ok(mesh),
                 "$PhysicalNames" => mesh.read_names(&mut file)?,
@@ -73,7 +73,7 @@ impl Mesh {
         known.extend(self.names.clone());
         known.retain(|group, _| (dimension - 1..=dimension).contains(&group.0));
         let found: Vec<_> = known.iter().filter(|(_, known)| *known == name).map(|(group, _)| *group).collect();
-        let [(of, tag)] = found[..] else {
+        let [(found_dimension, tag)] = found[..] else {
             let kinds = if dimension == 2 { "surface or curve" } else { "volume or surface" };
             let (count, known) = (found.len(), known.values().take(NAMED).map(|name| shown(name)).collect::<Vec<_>>());
             let name = shown(name);
@@ -82,10 +82,10 @@ impl Mesh {
             )));
         };
         let is_own = |entity: &(i32, i32)| self.groups.get(entity).is_some_and(|groups| groups.contains(&tag));
-        let blocks = self.blocks.iter().filter(|block| block.entity.0 == of && is_own(&block.entity));
+        let blocks = self.blocks.iter().filter(|block| block.entity.0 == found_dimension && is_own(&block.entity));
         let blocks: Vec<_> = blocks.filter(|block| !block.nodes.is_empty()).collect();
         let empty = || FileError(format!("has no elements in the group {name:?}; mesh the part before saving it"));
-        if blocks.is_empty() { Err(empty()) } else { Ok((of, blocks)) }
+        if blocks.is_empty() { Err(empty()) } else { Ok((found_dimension, blocks)) }
     }
 
     /// Reads the names of groups, which are text in binary files, too.
@@ -151,8 +151,8 @@ impl Mesh {
                 let order = "elements must be of first order: `Mesh.ElementOrder = 1`, or `gmsh -order 1`";
                 return Err(file.wrong(format!("elements of type {kind}; {order}")));
             };
-            let (is_own, of) = (dimension == entity.0, entity.0);
-            file.require(is_own, format_args!("elements of {dimension} dimensions in an entity of {of}"))?;
+            let is_own = dimension == entity.0;
+            file.require(is_own, format_args!("elements of {dimension} dimensions in an entity of {}", entity.0))?;
             let mut nodes = Vec::new();
             for _ in 0..file.size("the number of elements of a block")? {
                 let tag = file.size("the tag of an element")?;
@@ -175,17 +175,17 @@ fn shown(text: &str) -> String {
     text.chars().take(SHOWN).collect()
 }
 
-/// The bytes of a file, and up to where they have been read.
+/// The bytes of a file, and the position up to which they have been read.
 struct Reader<'a> {
     bytes: &'a [u8],
-    at: usize,
+    position: usize,
     binary: bool,
 }
 
 impl<'a> Reader<'a> {
-    /// What is wrong where the reader is.
+    /// The error for `found` at the position of the reader.
     fn wrong(&self, found: impl Display) -> FileError {
-        let before = &self.bytes[..self.at.min(self.bytes.len())];
+        let before = &self.bytes[..self.position.min(self.bytes.len())];
         let line = 1 + memchr_iter(b'\n', before).count();
         let place = if self.binary { format!("before byte {}", before.len()) } else { format!("in line {line}") };
         FileError(format!("has, {place}, {found}"))
@@ -196,14 +196,14 @@ impl<'a> Reader<'a> {
     }
 
     fn rest(&self) -> &'a [u8] {
-        self.bytes.get(self.at..).unwrap_or_default()
+        self.bytes.get(self.position..).unwrap_or_default()
     }
 
     /// The text up to the next byte of the kind `ends`, without blanks around it.
     fn text(&mut self, ends: fn(&u8) -> bool) -> String {
         let rest = self.rest().trim_ascii_start();
         let text = rest.split(ends).next().unwrap_or_default();
-        self.at = self.bytes.len() - rest.len() + text.len();
+        self.position = self.bytes.len() - rest.len() + text.len();
         String::from_utf8_lossy(text).trim().to_owned()
     }
 
@@ -217,11 +217,13 @@ impl<'a> Reader<'a> {
     }
 
     /// The next number: N bytes, or a word.
-    fn number<T: FromStr, const N: usize>(&mut self, what: &str, of: fn([u8; N]) -> T) -> Result<T, FileError> {
+    fn number<T: FromStr, const N: usize>(&mut self, what: &str, decode: fn([u8; N]) -> T) -> Result<T, FileError> {
         if self.binary {
             let bytes = self.rest().first_chunk();
-            self.at += N;
-            return bytes.map(|bytes| of(*bytes)).ok_or_else(|| self.wrong(format_args!("its end instead of {what}")));
+            self.position += N;
+            return bytes
+                .map(|bytes| decode(*bytes))
+                .ok_or_else(|| self.wrong(format_args!("its end instead of {what}")));
         }
         let word = self.word();
         word.parse().map_err(|_| self.wrong(format_args!("{:?} instead of {what}", shown(&word))))
@@ -261,7 +263,7 @@ impl<'a> Reader<'a> {
     fn skip(&mut self, section: &str) -> Result<(), FileError> {
         self.require(section.starts_with('$'), format_args!("{:?} instead of a section", shown(section)))?;
         let end = memmem::find(self.rest(), section.replacen('$', "$End", 1).as_bytes());
-        self.at += end.ok_or_else(|| self.wrong(format_args!("{:?} without its end", shown(section))))?;
+        self.position += end.ok_or_else(|| self.wrong(format_args!("{:?} without its end", shown(section))))?;
         Ok(())
     }
 
@@ -276,7 +278,7 @@ impl<'a> Reader<'a> {
         self.require(allowed, "another type of file than 0 or 1, or another size of numbers than 8")?;
         self.binary = mode == "1";
         if self.binary {
-            self.at += 1;
+            self.position += 1;
             let order = "numbers in another order of bytes; save it as text, `Mesh.Binary = 0`";
             let is_one = self.int("the number 1")? == 1;
             self.require(is_one, order)?;

@@ -83,7 +83,7 @@ fn results_that_cannot_be_run_again_are_refused() -> Result<(), Failure> {
     assert!(code == Some(2) && text.contains("holds files"), "{text}");
     for (text, word) in [
         (good.replacen("\"threads\": 1", "\"threads\": 0", 1), "must be from 1 to 1024"),
-        (good.replacen("density", "densiti", 1), "its checksum differs"),
+        (good.replacen("density", "densiti", 1), "differs from its checksum"),
         (good.replacen("\"until\"", "\"untill\"", 1), "unknown field `untill`"),
         (String::new(), "no provenance"),
     ] {
