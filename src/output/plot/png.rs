@@ -156,3 +156,62 @@ pub(super) fn texts(picture: &Picture) -> Vec<(String, Extent)> {
     };
     picture.elements.iter().filter_map(text).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_text_ends_or_begins_where_its_anchor_says() -> Result<(), &'static str> {
+        let extent = |anchor| -> Result<Extent, &'static str> {
+            let mut picture = Picture::new(200.0, 100.0);
+            picture.text((100.0, 50.0), anchor, 20.0, [0; 3], "HH");
+            Ok(texts(&picture).pop().ok_or("no text")?.1)
+        };
+        // An H stands on the base line, is 0.729 of the font size high, and has blanks of 0.098 of it at both sides.
+        let (width, blank, high) = (font::width("HH", 20.0), 0.098 * 20.0, 0.729 * 20.0);
+        let right = |from: f64| [from + blank, 50.0 - high, from + width - blank, 50.0];
+        let upwards = [100.0 - high, 50.0 - width / 2.0 + blank, 100.0, 50.0 + width / 2.0 - blank];
+        for (anchor, expected) in [
+            (Anchor::Start, right(100.0)),
+            (Anchor::Middle, right(100.0 - width / 2.0)),
+            (Anchor::End, right(100.0 - width)),
+            (Anchor::Upright, upwards),
+        ] {
+            let Extent { left, top, right, bottom } = extent(anchor)?;
+            let near = |(a, b): (f64, f64)| (a - b).abs() < 0.02;
+            assert!(
+                [left, top, right, bottom].into_iter().zip(expected).all(near),
+                "{anchor:?}: {:?}, {expected:?}",
+                [left, top, right, bottom]
+            );
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn later_elements_cover_earlier_ones_inside_lines_and_through_layers() -> Result<(), Box<dyn std::error::Error>> {
+        let square = |from: f64, to: f64| vec![(from, from), (to, from), (to, to), (from, to)];
+        let mut picture = Picture::new(40.0, 40.0);
+        picture.polygon(square(2.0, 38.0), [255, 0, 0]);
+        // The hole runs the other way round.
+        let hole = square(14.0, 26.0).into_iter().rev().collect();
+        let lines = vec![square(6.0, 34.0), hole, square(28.0, 36.0)];
+        picture.inside(lines, |picture| picture.polygon(square(0.0, 40.0), [0, 0, 255]));
+        picture.disc((36.0, 4.0), 1.5, [0, 255, 0], [0, 255, 0]);
+        picture.translucent(0.5, |picture| picture.disc((10.0, 10.0), 2.0, [0; 3], [0; 3]));
+        let png = picture.png("squares")?;
+        let mut reader = png::Decoder::new(std::io::Cursor::new(png)).read_info()?;
+        let mut bytes = vec![0; reader.output_buffer_size().ok_or("too large")?];
+        reader.next_frame(&mut bytes)?;
+        let pixel = |x: usize, y: usize| &bytes[(2 * y * 80 + 2 * x) * 4..][..4];
+        let [white, red, green, blue] = [[255, 255, 255], [255, 0, 0], [0, 255, 0], [0, 0, 255]];
+        for (x, y, color) in [(1, 1, white), (4, 4, red), (20, 20, red), (30, 30, blue), (35, 35, blue), (36, 4, green)]
+        {
+            assert_eq!(pixel(x, y), [color[0], color[1], color[2], 255], "at ({x}, {y})");
+        }
+        // Half black over blue.
+        assert!(pixel(10, 10)[2].abs_diff(128) <= 1 && pixel(10, 10)[..2] == [0, 0], "{:?}", pixel(10, 10));
+        Ok(())
+    }
+}
