@@ -154,6 +154,7 @@ pub mod clock;
 #[cfg(doc)]
 pub mod examples;
 pub mod field;
+pub mod gpu;
 pub mod grid;
 mod lanes;
 pub mod material;

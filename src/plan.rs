@@ -16,7 +16,7 @@ use crate::particles::Body;
 use crate::simulation::{SharedNodes, Simulation};
 use crate::solver::{Krylov, Preconditioning};
 use crate::tensor::Vector;
-use arrays::arrays;
+use arrays::{arrays, device_bytes};
 use indicatif::BinaryBytes;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -145,6 +145,8 @@ pub struct Plan {
     pub terms: Vec<TermUse>,
     /// The large arrays.
     pub arrays: Vec<ArrayUse>,
+    /// Bytes on a GPU, if the linear systems are solved there.
+    pub on_gpu: u64,
     /// The points and the area assumed for each loaded surface.
     pub surfaces: Vec<SurfaceUse>,
     /// Bodies that share nodes at the start, in words.
@@ -175,6 +177,7 @@ impl Plan {
             preconditioner: simulation.preconditioner(),
             terms: terms(simulation, &supports, cells),
             arrays: arrays(simulation, &supports, cells),
+            on_gpu: device_bytes(simulation, &supports) as u64,
             surfaces: SurfaceUse::of(simulation),
             shared_nodes: shared_nodes(simulation, &supports),
         })

@@ -74,8 +74,8 @@ impl Scene {
     }
 
     /// The simulation at its start.
-    #[pyo3(signature = (*, laws = None))]
-    fn build(&self, py: Python<'_>, laws: Option<HashMap<String, Py<Law>>>) -> PyResult<Simulation> {
+    #[pyo3(signature = (*, laws = None, gpu = false))]
+    fn build(&self, py: Python<'_>, laws: Option<HashMap<String, Py<Law>>>, gpu: bool) -> PyResult<Simulation> {
         let laws: HashMap<String, BodyLaw> =
             laws.into_iter().flatten().map(|(name, law)| (name, BodyLaw::Energy(law.get().law.clone()))).collect();
         let bodies: Vec<&str> = self.scene.bodies.iter().map(|body| body.name.as_str()).collect();
@@ -83,9 +83,9 @@ impl Scene {
             return Err(SceneError::new_err(format!("laws: no body is called {unknown:?}; the bodies are {bodies:?}")));
         }
         py.detach(|| match self.scene.dimension() {
-            1 => self.build_in::<1>(&laws),
-            2 => self.build_in::<2>(&laws),
-            _ => self.build_in::<3>(&laws),
+            1 => self.build_in::<1>(&laws, gpu),
+            2 => self.build_in::<2>(&laws, gpu),
+            _ => self.build_in::<3>(&laws, gpu),
         })
     }
 
@@ -97,14 +97,17 @@ impl Scene {
 }
 
 impl Scene {
-    fn build_in<const D: usize>(&self, laws: &HashMap<String, BodyLaw>) -> PyResult<Simulation> {
+    fn build_in<const D: usize>(&self, laws: &HashMap<String, BodyLaw>, gpu: bool) -> PyResult<Simulation> {
         let available = || memory::available().unwrap_or(u64::MAX);
         let simulation =
             self.scene.build_within::<D>(&self.folder, available()).map_err(|error| scene_error(&error))?;
-        let simulation = simulation.with_laws(|body| match laws.get(&body.name) {
+        let mut simulation = simulation.with_laws(|body| match laws.get(&body.name) {
             Some(law) => law.clone(),
             None => BodyLaw::Shipped(body.law.clone()),
         });
+        if gpu {
+            simulation.use_gpu().map_err(|error| scene_error(&error))?;
+        }
         let plan = Plan::of(&simulation).map_err(|error| scene_error(&error))?;
         plan.check_fits(available()).map_err(|error| scene_error(&error))?;
         let start = Reference::of(&simulation);

@@ -304,6 +304,15 @@ def test_other_threads_go_on_while_a_step_is_taken():
     assert sum(start < at < end for at in counted) > 0.1 * (end - start) / 1e-3, end - start
 
 
+def test_a_missing_gpu_is_an_exception():
+    try:
+        simulation = bfree.Scene(REBOUND).build(gpu=True)
+    except bfree.SceneError as error:
+        assert "no NVIDIA driver" in str(error) or "device" in str(error)
+    else:
+        simulation.advance()
+
+
 def test_a_step_can_be_interrupted_and_nothing_has_moved():
     # One load step of seconds.
     simulation = bfree.Scene(ROOT / "scenes" / "cook.json", set={"grid.spacing": 0.25, "time.step": 1}).build()

@@ -262,7 +262,7 @@ impl<const D: usize> Rows<D> {
     fn product(tangent: Tangent<'_, D>, along: Trial<'_, f64, D>) -> Self {
         let mut rows = Self::zeros(along);
         if along.dilatation.is_empty() {
-            tangent.product(along.phi, &mut rows.nodes);
+            tangent.solver_product(along.phi, &mut rows.nodes);
             return rows;
         }
         let x = [bytemuck::cast_slice(along.phi), along.dilatation].concat();

@@ -14,6 +14,7 @@ pub mod loads;
 mod local_form;
 pub mod mass;
 pub(crate) mod mixed;
+mod on_device;
 pub mod path;
 mod problem;
 pub mod reference;

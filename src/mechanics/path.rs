@@ -4,12 +4,14 @@
 //! d·Δφ + w Δλ = Δs, with d the direction of the last step, is the plane of Riks (1979). The weight w is fixed, so λ is a function of φ,
 //! and R(φ, λ(φ)) is a residual like any other. Its tangent K + f′ dᵀ/w is regular at limit points, where K is singular.
 
+use crate::gpu::{Gpu, GpuVector};
 use crate::material::Law;
 use crate::mechanics::residual::{Equilibrium, Inadmissible};
 use crate::pooled::Pooled;
-use crate::solver::{LinearOperator, Linearization, LocalForm, NonlinearProblem};
-use crate::space::vector;
+use crate::solver::{LinearOperator, Linearization, LocalForm, NonlinearProblem, OnDevice};
+use crate::space::vector::{self, Vectors};
 use crate::tensor::Vector;
+use std::sync::Arc;
 
 /// Upper bound of the loads' share in the arc length. With a small share, the plane meets the path even where loads fall steeply.
 const SHARE: f64 = 0.1;
@@ -182,7 +184,35 @@ impl<const D: usize> Linearization for Bordered<'_, D> {
         self.tangent.diagonal_blocks()
     }
 
+    fn on_device(&self) -> Option<Box<dyn OnDevice + '_>> {
+        let tangent = self.tangent.on_device()?;
+        let on_device = |field: &[Vector<f64, D>]| tangent.gpu().vector(bytemuck::cast_slice(field));
+        let (slope, direction) = (on_device(&self.slope), on_device(self.direction));
+        Some(Box::new(DeviceBordered { tangent, slope, direction }))
+    }
+
     fn local_form(&self) -> Option<LocalForm> {
         self.tangent.local_form()
+    }
+}
+
+/// [`Bordered`] on a device.
+struct DeviceBordered<'a> {
+    tangent: Box<dyn OnDevice + 'a>,
+    slope: GpuVector,
+    direction: GpuVector,
+}
+
+impl LinearOperator<GpuVector> for DeviceBordered<'_> {
+    fn apply(&self, x: &GpuVector, y: &mut GpuVector) {
+        self.tangent.apply(x, y);
+        let along = self.gpu().dot(&self.direction, x);
+        self.gpu().axpy(along, &self.slope, y);
+    }
+}
+
+impl OnDevice for DeviceBordered<'_> {
+    fn gpu(&self) -> &Arc<Gpu> {
+        self.tangent.gpu()
     }
 }

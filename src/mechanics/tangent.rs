@@ -12,7 +12,7 @@ use crate::mechanics::trial::Trial;
 use crate::parallel::{self, PART};
 use crate::particles::{Body, Particles};
 use crate::pooled::Pooled;
-use crate::solver::{LinearOperator, Linearization, LocalForm};
+use crate::solver::{LinearOperator, Linearization, LocalForm, OnDevice};
 use crate::space::Space;
 use crate::tensor::{Tensor, Vector};
 use num_dual::Dual64;
@@ -219,6 +219,10 @@ impl<const D: usize> LinearOperator for Tangent<'_, D> {
 impl<const D: usize> Linearization for Tangent<'_, D> {
     fn diagonal_blocks(&self) -> Pooled<f64> {
         Self::diagonal_blocks(self).into_numbers()
+    }
+
+    fn on_device(&self) -> Option<Box<dyn OnDevice + '_>> {
+        Some(Box::new(self.device_tangent()?))
     }
 
     fn local_form(&self) -> Option<LocalForm> {

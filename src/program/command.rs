@@ -30,7 +30,13 @@ enum Command {
     /// Run a scene.
     Run(Run),
     /// Validate a scene and print what it requires.
-    Check(SceneArguments),
+    Check {
+        #[command(flatten)]
+        scene: SceneArguments,
+        /// Say also whether the scene runs on the GPU of this machine, and how much of its memory it takes.
+        #[arg(long)]
+        gpu: bool,
+    },
     /// Write a starter scene and explain its keys. Without a problem, list the problems.
     New(New),
     /// Check that the tangent of a law in a shared library (UMAT, MFront, C) is the derivative of its stress.
@@ -83,7 +89,7 @@ pub fn main() -> ExitCode {
     let json = matches!(&command, Command::Run(run) if run.tells_json());
     let result = match command {
         Command::Run(run) => run.execute(),
-        Command::Check(arguments) => arguments.check(),
+        Command::Check { scene, gpu } => scene.check(gpu),
         Command::New(new) => new.execute(),
         Command::CheckLaw(check) => check.execute(),
         Command::Newton(newton) => newton.execute(),

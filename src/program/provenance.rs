@@ -24,6 +24,8 @@ pub(super) struct Command {
     pub until: Option<f64>,
     pub steps: Option<u64>,
     pub threads: u64,
+    #[serde(default)]
+    pub gpu: bool,
     pub check_tangent: Option<u64>,
 }
 

@@ -44,6 +44,9 @@ pub struct Run {
     /// Threads, 1 to 1024 [default: all cores]. Results are bitwise identical for any number of threads.
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1, parallel::MOST_THREADS))]
     threads: Option<u64>,
+    /// Solve the linear systems on a GPU, an NVIDIA device of compute capability 8 or higher. Results are bitwise identical.
+    #[arg(long)]
+    gpu: bool,
     /// Compare the tangent with dual numbers every EVERY steps, and stop if they differ.
     #[arg(long, value_name = "EVERY", num_args = 0..=1, default_missing_value = "1", allow_negative_numbers = true,
           value_parser = whole(1, MAX_STEPS as u64))]
@@ -117,6 +120,9 @@ impl Run {
     fn execute_in<const D: usize>(&self, scene: &Scene, start: Instant) -> Result<(), Failure> {
         let mut simulation = self.scene.build::<D>(scene)?;
         self.scene.plan(&simulation)?;
+        if self.gpu {
+            simulation.use_gpu().map_err(Failure::scene)?;
+        }
         simulation.settings.check_tangent = self.check_tangent.and_then(NonZeroU64::new);
         let directory = directory::of_results(self.out.as_deref(), &self.scene.scene)?;
         let probes = bound_probes(scene, &simulation);
@@ -196,6 +202,7 @@ impl Run {
             ("settings".to_owned(), serde_json::to_value(scene).map_err(Failure::run)?),
             ("krylov".to_owned(), json!({ "method": krylov.to_string(), "why": why_krylov })),
             ("preconditioner".to_owned(), json!({ "method": preconditioner.to_string(), "why": why_preconditioner })),
+            ("gpu".to_owned(), json!(simulation.settings.gpu.as_ref().map(|gpu| gpu.name()))),
             ("scene_warnings".to_owned(), json!(warnings)),
             ("probes".to_owned(), probes.iter().map(Bound::report).collect()),
             ("surfaces".to_owned(), serde_json::to_value(SurfaceUse::of(simulation)).map_err(Failure::run)?),
@@ -306,6 +313,7 @@ impl Run {
             until: self.until,
             steps: self.steps,
             threads: parallel::threads() as u64,
+            gpu: self.gpu,
             check_tangent: self.check_tangent,
         }
     }
@@ -319,7 +327,7 @@ impl Run {
     /// The run of a provenance again, with results in `out`. A file of results is data, so it allows no library.
     pub(super) fn again(provenance: &Provenance, out: &Path, libraries: &[PathBuf]) -> Self {
         let Provenance { command, folder, scene, .. } = provenance;
-        let Command { set: overrides, until, steps, threads, check_tangent, .. } = command.clone();
+        let Command { set: overrides, until, steps, threads, gpu, check_tangent, .. } = command.clone();
         let name = Path::new(&command.scene).file_name().unwrap_or(OsStr::new("scene.json"));
         let scene = SceneArguments {
             scene: Path::new(folder).join(name),
@@ -328,7 +336,7 @@ impl Run {
             text: OnceCell::from(scene.clone()),
         };
         let (out, threads) = (Some(out.to_owned()), Some(threads));
-        Self { scene, out, until, steps, threads, check_tangent, quiet: true, ..Self::default() }
+        Self { scene, out, until, steps, threads, gpu, check_tangent, quiet: true, ..Self::default() }
     }
 }
 

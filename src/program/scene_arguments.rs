@@ -2,6 +2,7 @@
 
 use super::failure::{Failure, print, tell};
 use super::probes::{Bound, bound_probes};
+use crate::gpu::{Gpu, GpuError};
 use crate::material::allow_library;
 use crate::memory;
 use crate::particles::Particles;
@@ -9,6 +10,7 @@ use crate::plan::Plan;
 use crate::scene::{self, Override, Scene, SceneError};
 use crate::simulation::Simulation;
 use clap::Args;
+use indicatif::BinaryBytes;
 use std::cell::OnceCell;
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -79,16 +81,16 @@ impl SceneArguments {
     }
 
     /// Runs `bfree check`: prints the particles, plan, output and probes of the scene.
-    pub(crate) fn check(&self) -> Result<(), Failure> {
+    pub(crate) fn check(&self, gpu: bool) -> Result<(), Failure> {
         let scene = self.read()?;
         match scene.dimension() {
-            1 => self.check_in::<1>(&scene),
-            2 => self.check_in::<2>(&scene),
-            _ => self.check_in::<3>(&scene),
+            1 => self.check_in::<1>(&scene, gpu),
+            2 => self.check_in::<2>(&scene, gpu),
+            _ => self.check_in::<3>(&scene, gpu),
         }
     }
 
-    fn check_in<const D: usize>(&self, scene: &Scene) -> Result<(), Failure> {
+    fn check_in<const D: usize>(&self, scene: &Scene, gpu: bool) -> Result<(), Failure> {
         let simulation = self.build::<D>(scene)?;
         let mut lines: Vec<String> = scene.title.iter().cloned().collect();
         lines.extend(what_accuracy_sets(scene).map(|set| format!("accuracy      {set}")));
@@ -111,7 +113,11 @@ impl SceneArguments {
             let contact = "contact       bodies feel each other before their surfaces meet";
             lines.push(format!("{contact}: {felt}, see docs/src/limits.md"));
         }
-        lines.push(self.plan(&simulation)?.to_string());
+        let plan = self.plan(&simulation)?;
+        lines.push(plan.to_string());
+        if gpu {
+            lines.push(on_gpu(&simulation, &plan)?);
+        }
         lines.push(format!("output        {}", written(scene)));
         let probes = bound_probes(scene, &simulation);
         lines.extend(probes.iter().map(|bound| format!("probe         {bound}")));
@@ -119,6 +125,23 @@ impl SceneArguments {
             tell(format_args!("warning: {warning}"));
         }
         print(lines.join("\n"))
+    }
+}
+
+/// The memory that a run takes on the GPU, in words.
+///
+/// # Errors
+/// There is no GPU, or the scene does not run there.
+fn on_gpu<const D: usize>(simulation: &Simulation<D>, plan: &Plan) -> Result<String, Failure> {
+    simulation.check_gpu().map_err(Failure::scene)?;
+    let gpu = Gpu::open().map_err(Failure::scene)?;
+    let (free, _) = gpu.memory();
+    let (needed, name) = (BinaryBytes(plan.on_gpu), gpu.name());
+    let line = format!("gpu           {needed} on {name}, where {} are free", BinaryBytes(free as u64));
+    if plan.on_gpu <= free as u64 {
+        Ok(line)
+    } else {
+        Err(Failure::scene(GpuError::Memory { bytes: plan.on_gpu as usize, free, total: gpu.memory().1 }))
     }
 }
 

@@ -201,6 +201,7 @@ impl Scene {
             preconditioner: krylov.preconditioner,
             error_tolerance: self.time.adaptive.map(|adaptive| adaptive.tolerance),
             check_tangent: None,
+            gpu: None,
             stop: None,
         }
     }

@@ -107,7 +107,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         if let Some(sentence) = self.bodies.iter().find_map(|body| body.law.last_failure()) {
             return StepError::LawFailed { sentence, source: error };
         }
-        if matches!(error.cause, NewtonFailure::Stopped) {
+        if matches!(error.cause, NewtonFailure::Stopped) || error.cause.is_of_device() {
             return StepError::Newton(error);
         }
         let is_static = equilibrium.step.nodal.is_static();

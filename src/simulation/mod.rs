@@ -7,6 +7,7 @@ mod entry;
 mod first_guess;
 mod history;
 mod next_step;
+mod on_gpu;
 mod preconditioner;
 mod refinement;
 mod report;

@@ -306,6 +306,11 @@ impl StepError {
     pub fn is_stopped(&self) -> bool {
         matches!(self, Self::Newton(error) if matches!(error.cause, NewtonFailure::Stopped))
     }
+
+    /// Whether the device failed on which linear systems are solved.
+    pub fn is_of_device(&self) -> bool {
+        matches!(self, Self::Newton(error) if error.cause.is_of_device())
+    }
 }
 
 /// The simulation cannot continue. The particles have the state after the last successful step.

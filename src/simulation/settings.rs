@@ -1,5 +1,6 @@
 //! Numerical settings of a step.
 
+use crate::gpu::Gpu;
 use crate::mechanics::reference::GridReset;
 use crate::mechanics::schemes::{Newmark, Scheme};
 use crate::mechanics::smoothing::Smoothing;
@@ -54,6 +55,8 @@ pub struct Settings {
     pub error_tolerance: Option<f64>,
     /// The tangent is compared with dual numbers at the end of every so many steps.
     pub check_tangent: Option<NonZeroU64>,
+    /// The device on which linear systems are solved; `None` for the processor.
+    pub gpu: Option<Arc<Gpu>>,
     /// A function that may stop a step early.
     pub stop: Option<Stop>,
 }
@@ -74,6 +77,7 @@ impl Default for Settings {
             preconditioner: Preconditioning::default(),
             error_tolerance: None,
             check_tangent: None,
+            gpu: None,
             stop: None,
         }
     }

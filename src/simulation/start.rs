@@ -45,7 +45,8 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             let at_surface = approximation.separable().map_or(AtSurface::Own, Separable::at_surface);
             points = at_surface_points(points, particles, loads, grid, at_surface);
         }
-        Ok(Supports::rebuilt(spare, approximation, grid, &points, &workspace.pool)?.0)
+        let (supports, _) = Supports::rebuilt(spare, approximation, grid, &points, &workspace.pool)?;
+        Ok(supports.with_gpu(settings.gpu.clone()))
     }
 
     /// The shape functions with [`aggregation`](crate::aggregation), if the settings ask for it: nodes with little support from a body then

@@ -204,7 +204,7 @@ impl<const D: usize, L: Law + 'static, A: ShapeFunction + 'static> Simulation<D,
                 continue;
             }
             let mended = match cause {
-                ref stopped if stopped.is_stopped() => false,
+                ref end if end.is_stopped() || end.is_of_device() => false,
                 StepError::Newton(_)
                 | StepError::LawFailed { .. }
                 | StepError::Unbalanced { .. }

@@ -1,8 +1,8 @@
 //! Preconditioned conjugate gradients (Saad, Iterative Methods for Sparse Linear Systems, 2nd ed., alg. 9.1).
 
 use super::{LinearError, LinearOperator, LinearOutcome, LinearReport, begin, finite, true_residual};
-use crate::pooled::{Pool, Pooled};
-use crate::space::vector::{axpy, dot, norm, norm_with, update_pair, xpby};
+use crate::pooled::Pool;
+use crate::space::vector::{Along, Vectors};
 
 /// A curvature below this multiple of eps times the largest curvature so far is round-off in size and sign.
 const UNRESOLVED: f64 = 16.0;
@@ -67,116 +67,143 @@ pub fn conjugate_gradient(
     settings: &ConjugateGradientSettings,
     workspace: &Pool,
 ) -> Result<LinearReport, LinearError> {
-    let (mut report, b_norm) = begin(rhs, solution, settings.relative_tolerance)?;
-    if b_norm == 0.0 {
-        return Ok(report);
-    }
-    let target = settings.relative_tolerance * b_norm;
-    let mut r = workspace.collect(rhs.iter().copied());
-    let mut r_norm = b_norm;
-    loop {
-        let ended = descend(operator, preconditioner, &mut r, target, solution, settings.max_iterations, &mut report)?;
-        let reached = true_residual(operator, rhs, solution, &mut r, &mut report)?;
-        report.relative_residual = reached / b_norm;
-        report.outcome = match ended {
-            _ if reached <= target => LinearOutcome::Converged,
-            // The residual of the recurrence has drifted, but the true residual still improves.
-            LinearOutcome::Converged if reached < 0.5 * r_norm => {
-                r_norm = reached;
-                continue;
-            }
-            LinearOutcome::Converged => LinearOutcome::Stagnated,
-            _ => ended,
-        };
-        return Ok(report);
+    settings.solve(workspace, operator, preconditioner, rhs, solution)
+}
+
+impl ConjugateGradientSettings {
+    /// [`conjugate_gradient`] where the vectors lie.
+    ///
+    /// # Errors
+    /// See [`conjugate_gradient`].
+    pub fn solve<S: Vectors>(
+        &self,
+        vectors: &S,
+        operator: &dyn LinearOperator<S::Vector>,
+        preconditioner: &dyn LinearOperator<S::Vector>,
+        rhs: &S::Vector,
+        solution: &mut S::Vector,
+    ) -> Result<LinearReport, LinearError> {
+        let (mut report, b_norm) = begin(vectors, rhs, solution, self.relative_tolerance)?;
+        if b_norm == 0.0 {
+            return Ok(report);
+        }
+        let target = self.relative_tolerance * b_norm;
+        let mut r = vectors.copied(rhs);
+        let mut r_norm = b_norm;
+        let system = System { vectors, operator, preconditioner, target, max_iterations: self.max_iterations };
+        loop {
+            let ended = system.descend(&mut r, solution, &mut report)?;
+            let reached = true_residual(vectors, operator, rhs, solution, &mut r, &mut report)?;
+            report.relative_residual = reached / b_norm;
+            report.outcome = match ended {
+                _ if reached <= target => LinearOutcome::Converged,
+                // The residual of the recurrence has drifted, but the true residual still improves.
+                LinearOutcome::Converged if reached < 0.5 * r_norm => {
+                    r_norm = reached;
+                    continue;
+                }
+                LinearOutcome::Converged => LinearOutcome::Stagnated,
+                _ => ended,
+            };
+            return Ok(report);
+        }
     }
 }
 
-/// Steps 1 to 4 from the residual `r`, counted in `report`. Leaves the best iterate in `solution`.
-fn descend(
-    operator: &dyn LinearOperator,
-    preconditioner: &dyn LinearOperator,
-    r: &mut Pooled<f64>,
+/// A system, and where its iteration ends.
+struct System<'a, S: Vectors> {
+    vectors: &'a S,
+    operator: &'a dyn LinearOperator<S::Vector>,
+    preconditioner: &'a dyn LinearOperator<S::Vector>,
     target: f64,
-    solution: &mut [f64],
     max_iterations: usize,
-    report: &mut LinearReport,
-) -> Result<LinearOutcome, LinearError> {
-    let mut iterates = Iterates::new(solution, r.pool());
-    let (mut z, mut q) = (r.pool().filled(r.len(), 0.0), r.pool().filled(r.len(), 0.0));
-    preconditioner.apply(r, &mut z);
-    let mut p = z.clone();
-    let mut rz = dot(r, &z);
-    // p·Mp, by recurrence: Mp = r + β Mp_old and z·Mp_old = r·p_old = 0.
-    let mut p_m_p = rz;
-    let mut largest: f64 = 0.0;
-    let (mut best, mut best_at) = (norm(r), report.iterations);
-    loop {
-        let at = report.iterations;
-        if let Some(outcome) = ends(finite(rz, "r·z", at)?, at >= max_iterations, at - best_at > r.len() + PATIENCE) {
-            solution.copy_from_slice(iterates.best());
-            return Ok(outcome);
-        }
-        operator.apply(&p, &mut q);
-        report.products += 1;
-        let p_a_p = finite(dot(&p, &q), "p·Ap", at)?;
-        let curvature = p_a_p / p_m_p;
-        mutant!("solver: negative curvature counts as positive": curvature = curvature.abs());
-        if let Some(outcome) = unusable(curvature, &mut largest) {
-            solution.copy_from_slice(match outcome {
-                // The step length for a curvature of the opposite sign.
-                LinearOutcome::NegativeCurvature => iterates.last_or_step(-rz / p_a_p, &p),
-                _ => iterates.best(),
-            });
-            return Ok(outcome);
-        }
-        let square = iterates.advance(rz / p_a_p, [&p, &q], r);
-        report.iterations += 1;
-        let r_norm = finite(norm_with(square, r), "the norm of the residual", at)?;
-        if r_norm < best {
-            (best, best_at) = (r_norm, report.iterations);
-            iterates.is_best = true;
-            if r_norm <= target {
-                solution.copy_from_slice(&iterates.x);
-                return Ok(LinearOutcome::Converged);
-            }
-        }
+}
+
+impl<S: Vectors> System<'_, S> {
+    /// Steps 1 to 4 from the residual `r`, counted in `report`. Leaves the best iterate in `solution`.
+    fn descend(
+        &self,
+        r: &mut S::Vector,
+        solution: &mut S::Vector,
+        report: &mut LinearReport,
+    ) -> Result<LinearOutcome, LinearError> {
+        let &Self { vectors, operator, preconditioner, target, max_iterations } = self;
+        let mut iterates = Iterates::new(vectors, solution);
+        let n = vectors.len(r);
+        let (mut z, mut q) = (vectors.zeros(n), vectors.zeros(n));
         preconditioner.apply(r, &mut z);
-        let rz_new = dot(r, &z);
-        let β = rz_new / rz;
-        mutant!("solver: the inverse of β in conjugate gradients": β = 1.0 / β);
-        xpby(&z, β, &mut p);
-        rz = rz_new;
-        p_m_p = rz + β * β * p_m_p;
+        let mut p = vectors.copied(&z);
+        let mut rz = vectors.dot(r, &z);
+        // p·Mp, by recurrence: Mp = r + β Mp_old and z·Mp_old = r·p_old = 0.
+        let mut p_m_p = rz;
+        let mut largest: f64 = 0.0;
+        let (mut best, mut best_at) = (vectors.norm(r), report.iterations);
+        loop {
+            let at = report.iterations;
+            if let Some(outcome) = ends(finite(rz, "r·z", at)?, at >= max_iterations, at - best_at > n + PATIENCE) {
+                vectors.copy(iterates.best(), solution);
+                return Ok(outcome);
+            }
+            operator.apply(&p, &mut q);
+            report.products += 1;
+            let p_a_p = finite(vectors.dot(&p, &q), "p·Ap", at)?;
+            let curvature = p_a_p / p_m_p;
+            mutant!("solver: negative curvature counts as positive": curvature = curvature.abs());
+            if let Some(outcome) = unusable(curvature, &mut largest) {
+                let end = match outcome {
+                    // The step length for a curvature of the opposite sign.
+                    LinearOutcome::NegativeCurvature => iterates.last_or_step(-rz / p_a_p, &p),
+                    _ => iterates.best(),
+                };
+                vectors.copy(end, solution);
+                return Ok(outcome);
+            }
+            let square = iterates.advance(rz / p_a_p, &p, &q, r);
+            report.iterations += 1;
+            let r_norm = finite(vectors.norm_with(square, r), "the norm of the residual", at)?;
+            if r_norm < best {
+                (best, best_at) = (r_norm, report.iterations);
+                iterates.is_best = true;
+                if r_norm <= target {
+                    vectors.copy(&iterates.x, solution);
+                    return Ok(LinearOutcome::Converged);
+                }
+            }
+            preconditioner.apply(r, &mut z);
+            let rz_new = vectors.dot(r, &z);
+            let β = rz_new / rz;
+            mutant!("solver: the inverse of β in conjugate gradients": β = 1.0 / β);
+            vectors.xpby(&z, β, &mut p);
+            rz = rz_new;
+            p_m_p = rz + β * β * p_m_p;
+        }
     }
 }
 
 /// The present iterate and the best one.
-struct Iterates {
-    x: Pooled<f64>,
-    best: Pooled<f64>,
+struct Iterates<'a, S: Vectors> {
+    vectors: &'a S,
+    x: S::Owned,
+    best: S::Owned,
     /// The next iterate is written here, so that the best one stays without a copy.
-    next: Pooled<f64>,
+    next: S::Owned,
     /// Whether x is the best iterate.
     is_best: bool,
 }
 
-impl Iterates {
-    fn new(start: &[f64], pool: &Pool) -> Self {
-        let [x, best, next] = [(); 3].map(|()| pool.collect(start.iter().copied()));
-        Self { x, best, next, is_best: true }
+impl<'a, S: Vectors> Iterates<'a, S> {
+    fn new(vectors: &'a S, start: &S::Vector) -> Self {
+        let [x, best, next] = [(); 3].map(|()| vectors.copied(start));
+        Self { vectors, x, best, next, is_best: true }
     }
 
-    fn best(&self) -> &[f64] {
+    fn best(&self) -> &S::Vector {
         if self.is_best { &self.x } else { &self.best }
     }
 
-    /// x ← x + α p, r ← r − α A p, with `[p, A p]`. Returns r·r.
-    fn advance(&mut self, α: f64, [p, q]: [&[f64]; 2], r: &mut [f64]) -> f64 {
-        let square = update_pair([p, q, &self.x], &mut self.next, r, |[p, q, x], next, r| {
-            *next = x + α * p;
-            *r -= α * q;
-        });
+    /// x ← x + α p, r ← r − α q with q = A p. Returns r·r.
+    fn advance(&mut self, α: f64, p: &S::Vector, q: &S::Vector, r: &mut S::Vector) -> f64 {
+        let square = self.vectors.advance(α, Along { p, q, x: &self.x }, &mut self.next, r);
         if self.is_best {
             std::mem::swap(&mut self.x, &mut self.best);
         }
@@ -186,9 +213,9 @@ impl Iterates {
     }
 
     /// The last iterate. If it is zero, a step along p of the given length.
-    fn last_or_step(&mut self, length: f64, p: &[f64]) -> &[f64] {
-        if self.x.iter().all(|x| *x == 0.0) {
-            axpy(length, p, &mut self.x);
+    fn last_or_step(&mut self, length: f64, p: &S::Vector) -> &S::Vector {
+        if self.vectors.norm(&self.x) == 0.0 {
+            self.vectors.axpy(length, p, &mut self.x);
         }
         &self.x
     }
@@ -219,6 +246,7 @@ mod tests {
     use super::super::Identity;
     use super::super::testing::{Dense, distance, irregular};
     use super::*;
+    use crate::space::vector::{dot, norm};
 
     /// Solves with a memory pool of its own.
     fn conjugate_gradient(

@@ -25,8 +25,10 @@ pub use preconditioner::{
 pub(crate) use preconditioner::{multigrid_bytes, saddle_bytes};
 pub use stop::Stop;
 
+use crate::gpu::{Gpu, GpuVector};
 use crate::pooled::Pooled;
-use crate::space::vector;
+use crate::space::vector::Vectors;
+use std::sync::Arc;
 
 /// A square matrix that is known by its product with a vector.
 ///
@@ -52,13 +54,13 @@ use crate::space::vector;
 /// Laplacian.apply(&x, &mut y);
 /// assert!(x.iter().zip(&y).all(|(x, y)| (y - (2.0 - 2.0 * step.cos()) * x).abs() < 1e-15));
 /// ```
-pub trait LinearOperator {
+pub trait LinearOperator<V: ?Sized = [f64]> {
     /// `y = A x`; `x` and `y` have the order of the operator, and `y` is overwritten.
-    fn apply(&self, x: &[f64], y: &mut [f64]);
+    fn apply(&self, x: &V, y: &mut V);
 }
 
-impl<T: LinearOperator + ?Sized> LinearOperator for &T {
-    fn apply(&self, x: &[f64], y: &mut [f64]) {
+impl<V: ?Sized, T: LinearOperator<V> + ?Sized> LinearOperator<V> for &T {
+    fn apply(&self, x: &V, y: &mut V) {
         (**self).apply(x, y);
     }
 }
@@ -71,6 +73,11 @@ pub trait Linearization: LinearOperator {
     /// of the identity. A common positive factor does not matter.
     fn diagonal_blocks(&self) -> Pooled<f64>;
 
+    /// The system on a device, if it is solved there.
+    fn on_device(&self) -> Option<Box<dyn OnDevice + '_>> {
+        None
+    }
+
     /// The operator as a form on the cells of a grid, from which multigrid makes coarser levels; `None` if it has no such form.
     fn local_form(&self) -> Option<LocalForm> {
         None
@@ -80,6 +87,12 @@ pub trait Linearization: LinearOperator {
     fn saddle_point(&self) -> Option<&dyn SaddlePoint> {
         None
     }
+}
+
+/// A linearisation in the memory of a device.
+pub trait OnDevice: LinearOperator<GpuVector> {
+    /// The device.
+    fn gpu(&self) -> &Arc<Gpu>;
 }
 
 /// The parts of a system in motions u and pressures p of cells, [A Bᵀ; B −C], for preconditioners. A vector of the system has the entries of
@@ -308,13 +321,19 @@ impl InvalidSetting {
 ///
 /// # Errors
 /// The tolerance is out of range, the lengths differ, or the right-hand side is not finite.
-fn begin(rhs: &[f64], solution: &mut [f64], relative_tolerance: f64) -> Result<(LinearReport, f64), LinearError> {
+fn begin<S: Vectors>(
+    vectors: &S,
+    rhs: &S::Vector,
+    solution: &mut S::Vector,
+    relative_tolerance: f64,
+) -> Result<(LinearReport, f64), LinearError> {
     InvalidSetting::check_tolerance("relative_tolerance", relative_tolerance)?;
-    if rhs.len() != solution.len() {
-        return Err(LinearError::Length { rhs: rhs.len(), solution: solution.len() });
+    let length = LinearError::Length { rhs: vectors.len(rhs), solution: vectors.len(solution) };
+    if vectors.len(rhs) != vectors.len(solution) {
+        return Err(length);
     }
-    let b_norm = finite(vector::norm(rhs), "the norm of the right-hand side", 0)?;
-    solution.fill(0.0);
+    let b_norm = finite(vectors.norm(rhs), "the norm of the right-hand side", 0)?;
+    vectors.clear(solution);
     Ok((LinearReport { outcome: LinearOutcome::Converged, iterations: 0, products: 0, relative_residual: 0.0 }, b_norm))
 }
 
@@ -327,18 +346,19 @@ fn finite(value: f64, what: &'static str, iteration: usize) -> Result<f64, Linea
 ///
 /// # Errors
 /// x or r is not finite.
-fn true_residual(
-    operator: &dyn LinearOperator,
-    rhs: &[f64],
-    x: &[f64],
-    r: &mut [f64],
+fn true_residual<S: Vectors>(
+    vectors: &S,
+    operator: &dyn LinearOperator<S::Vector>,
+    rhs: &S::Vector,
+    x: &S::Vector,
+    r: &mut S::Vector,
     report: &mut LinearReport,
 ) -> Result<f64, LinearError> {
-    finite(vector::norm(x), "the norm of the solution", report.iterations)?;
+    finite(vectors.norm(x), "the norm of the solution", report.iterations)?;
     operator.apply(x, r);
     report.products += 1;
-    vector::xpby(rhs, -1.0, r);
-    finite(vector::norm(r), "the norm of the residual", report.iterations)
+    vectors.xpby(rhs, -1.0, r);
+    finite(vectors.norm(r), "the norm of the residual", report.iterations)
 }
 
 #[cfg(test)]

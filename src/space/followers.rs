@@ -1,6 +1,7 @@
 //! The extension E applied to vector fields, some of whose components are prescribed.
 
 use crate::aggregation::Extension;
+use crate::gpu::{self, Gpu};
 use crate::parallel;
 use crate::scalar::Real;
 use crate::tensor::Vector;
@@ -52,6 +53,18 @@ impl<const D: usize> Followers<D> {
     /// For each outer node: the components that follow, and the inner nodes with their weights.
     pub(crate) fn rows(&self) -> impl Iterator<Item = (usize, [bool; D], impl Iterator<Item = (usize, f64)>)> {
         self.extension.rows().zip(&self.follows).map(|((outer, leaders), follows)| (outer, *follows, leaders))
+    }
+
+    /// E on a device; `None` if every node is an unknown.
+    pub(crate) fn on_device(&self, gpu: &Gpu) -> Option<gpu::Followers> {
+        if self.is_empty() {
+            return None;
+        }
+        let entry = |(node, weight): (usize, f64)| (node as u32, weight);
+        let mut outer = self.rows().map(|(outer, _, leaders)| (outer as u32, leaders.map(entry).collect()));
+        let inner = self.extension.inner().iter().enumerate();
+        let mut inner = inner.map(|(at, &node)| (node, self.extension.followers(at).map(entry).collect()));
+        Some(gpu::Followers::new(gpu, &mut outer, &mut inner, self.follows.as_flattened()))
     }
 
     /// The row of an outer node; `None` for other nodes.

@@ -21,9 +21,158 @@
 //! ```
 
 use crate::parallel;
+use crate::pooled::{Pool, Pooled};
+use std::ops::DerefMut;
+
+/// The place where the vectors of a Krylov method lie, and the operations on them: the memory of the processor (a [`Pool`]), or a
+/// [device](crate::gpu). Both have the same bits.
+pub trait Vectors {
+    /// A vector.
+    type Vector: ?Sized;
+    /// A vector with memory of its own.
+    type Owned: DerefMut<Target = Self::Vector>;
+
+    /// Number of entries.
+    fn len(&self, x: &Self::Vector) -> usize;
+
+    /// `n` entries that are unspecified.
+    fn unspecified(&self, n: usize) -> Self::Owned {
+        self.zeros(n)
+    }
+
+    /// `n` zeros.
+    fn zeros(&self, n: usize) -> Self::Owned;
+
+    /// `y ← 0`
+    fn clear(&self, y: &mut Self::Vector);
+
+    /// `y ← x`
+    fn copy(&self, x: &Self::Vector, y: &mut Self::Vector);
+
+    /// `Σ xᵢ yᵢ`
+    fn dot(&self, x: &Self::Vector, y: &Self::Vector) -> f64;
+
+    /// ‖x‖, with `square` = x·x; not finite if any entry is not.
+    fn norm_with(&self, square: f64, x: &Self::Vector) -> f64;
+
+    /// `y ← a x + y`
+    fn axpy(&self, a: f64, x: &Self::Vector, y: &mut Self::Vector);
+
+    /// `y ← x + b y`
+    fn xpby(&self, x: &Self::Vector, b: f64, y: &mut Self::Vector);
+
+    /// `y ← a x`
+    fn scaled(&self, a: f64, x: &Self::Vector, y: &mut Self::Vector);
+
+    /// `y ← x / a`
+    fn divided(&self, x: &Self::Vector, a: f64, y: &mut Self::Vector);
+
+    /// `y ← a x + b y`
+    fn axpby(&self, a: f64, x: &Self::Vector, b: f64, y: &mut Self::Vector);
+
+    /// `x ← x + p`, `r ← r − q`
+    fn move_along(&self, p: &Self::Vector, q: &Self::Vector, x: &mut Self::Vector, r: &mut Self::Vector);
+
+    /// A step of conjugate gradients: `next ← x + α p`, `r ← r − α q`. Returns r·r.
+    fn advance(&self, α: f64, along: Along<'_, Self::Vector>, next: &mut Self::Vector, r: &mut Self::Vector) -> f64;
+
+    /// ‖x‖
+    fn norm(&self, x: &Self::Vector) -> f64 {
+        self.norm_with(self.dot(x, x), x)
+    }
+
+    /// A copy of x.
+    fn copied(&self, x: &Self::Vector) -> Self::Owned {
+        let mut copy = self.zeros(self.len(x));
+        self.copy(x, &mut copy);
+        copy
+    }
+}
+
+/// The direction of a [step](Vectors::advance) of conjugate gradients.
+#[derive(Debug)]
+pub struct Along<'a, V: ?Sized> {
+    /// p
+    pub p: &'a V,
+    /// A p
+    pub q: &'a V,
+    /// x
+    pub x: &'a V,
+}
+
+impl Vectors for Pool {
+    type Vector = [f64];
+    type Owned = Pooled<f64>;
+
+    fn len(&self, x: &[f64]) -> usize {
+        x.len()
+    }
+
+    fn unspecified(&self, n: usize) -> Pooled<f64> {
+        Pool::unspecified(self, n, 0.0)
+    }
+
+    fn zeros(&self, n: usize) -> Pooled<f64> {
+        self.filled(n, 0.0)
+    }
+
+    fn clear(&self, y: &mut [f64]) {
+        y.fill(0.0);
+    }
+
+    fn copy(&self, x: &[f64], y: &mut [f64]) {
+        y.copy_from_slice(x);
+    }
+
+    fn dot(&self, x: &[f64], y: &[f64]) -> f64 {
+        dot(x, y)
+    }
+
+    fn norm_with(&self, square: f64, x: &[f64]) -> f64 {
+        norm_with(square, x)
+    }
+
+    fn axpy(&self, a: f64, x: &[f64], y: &mut [f64]) {
+        axpy(a, x, y);
+    }
+
+    fn xpby(&self, x: &[f64], b: f64, y: &mut [f64]) {
+        xpby(x, b, y);
+    }
+
+    fn scaled(&self, a: f64, x: &[f64], y: &mut [f64]) {
+        scaled(a, x, y);
+    }
+
+    fn divided(&self, x: &[f64], a: f64, y: &mut [f64]) {
+        update(x, y, |x, _| x / a);
+    }
+
+    fn axpby(&self, a: f64, x: &[f64], b: f64, y: &mut [f64]) {
+        update(x, y, |x, y| b * y + a * x);
+    }
+
+    fn move_along(&self, p: &[f64], q: &[f64], x: &mut [f64], r: &mut [f64]) {
+        update_pair([p, q], x, r, |[p, q], x, r| {
+            *x += p;
+            *r -= q;
+        });
+    }
+
+    fn advance(&self, α: f64, Along { p, q, x }: Along<'_, [f64]>, next: &mut [f64], r: &mut [f64]) -> f64 {
+        update_pair([p, q, x], next, r, |[p, q, x], next, r| {
+            *next = x + α * p;
+            *r -= α * q;
+        })
+    }
+
+    fn copied(&self, x: &[f64]) -> Pooled<f64> {
+        self.collect(x.iter().copied())
+    }
+}
 
 /// Entries per partial sum.
-const CHUNK: usize = 2048;
+pub(crate) const CHUNK: usize = 2048;
 
 /// Below this length, waking the threads costs more than the work.
 const PARALLEL: usize = 8 * CHUNK;
@@ -60,9 +209,14 @@ pub fn norm(x: &[f64]) -> f64 {
     norm_with(dot(x, x), x)
 }
 
+/// Whether a sum of squares has lost no digit to underflow or overflow.
+pub(crate) fn is_safe_square(square: f64) -> bool {
+    (SAFE_SQUARE..=f64::MAX).contains(&square)
+}
+
 /// [`norm`], with `square` = x·x.
 pub(crate) fn norm_with(square: f64, x: &[f64]) -> f64 {
-    if (SAFE_SQUARE..=f64::MAX).contains(&square) {
+    if is_safe_square(square) {
         return square.sqrt();
     }
     // Squares underflow or overflow, all entries are zero, or one entry is not finite.

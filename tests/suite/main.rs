@@ -18,6 +18,7 @@ mod examples;
 mod flow;
 mod foreign;
 mod free_obstacles;
+mod gpu;
 mod hostile;
 mod images;
 mod incompressible;

@@ -47,8 +47,10 @@ class Scene:
     def to_dict(self) -> dict[str, Any]:
         """All of its keys, with the values of those that were left out."""
 
-    def build(self, *, laws: Mapping[str, Law] | None = None) -> Simulation:
+    def build(self, *, laws: Mapping[str, Law] | None = None, gpu: bool = False) -> Simulation:
         """The simulation at its start; `laws` takes the place of the materials of the bodies of these names.
+
+        With `gpu`, linear systems are solved on the GPU of this machine; `SceneError` if there is none.
 
         What bfree chooses by itself it chooses by the scene's material: give one of about the same stiffness.
 

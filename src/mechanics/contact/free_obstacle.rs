@@ -45,7 +45,7 @@ pub(crate) struct FreeMotion {
 }
 
 /// A place of contact on a free obstacle, linearised.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct FreePoint<const D: usize> {
     /// ∂f/∂q
     pub of_motion: SMatrix<f64, D, 6>,

@@ -1,6 +1,7 @@
 //! The linearised tangent of averaged cells, as rows of numbers.
 
 use super::{Along, FunctionsAt};
+use crate::gpu::{self, Gpu};
 use crate::lanes::LANES;
 use crate::mechanics::constitutive::{AddTo, Form, Product, add_quadratic, product};
 use crate::mechanics::dilatation::{Cells, Member, Scale};
@@ -115,6 +116,29 @@ impl<const D: usize> CellRows<D> {
     /// b of a member.
     pub(crate) fn volume_gradient(&self, member: &Member) -> Tensor<f64, D> {
         self.tensor(member, self.layout.b)
+    }
+
+    /// A copy on a device.
+    pub(crate) fn on_device(&self, gpu: &Gpu, supports: &Supports<D>) -> gpu::Rows {
+        let (mut first, mut members) = (vec![0], Vec::new());
+        let mut of_particles = vec![u32::MAX; supports.groups() * LANES];
+        for (cell, (own, _)) in self.cells.iter().enumerate() {
+            members.extend(own.iter().map(|member| member.slot));
+            first.push(members.len() as u32);
+            own.iter().for_each(|member| of_particles[member.slot as usize] = cell as u32);
+        }
+        let cells = gpu::Cells {
+            first_of_a: self.layout.a,
+            first_of_b: self.layout.b,
+            volumes: gpu.memory_for(of_particles.len()),
+            of_particles: gpu.copy_of(&of_particles),
+            members: [first, members].map(|list| gpu.copy_of(&list)),
+            changes: gpu.memory_for(self.stiffness.len()),
+            stiffness: gpu.copy_of(&self.stiffness),
+        };
+        let rows = Arc::new(gpu.copy_of(self.rows.as_flattened()));
+        let (form, count) = (self.layout.form as i32, self.layout.count);
+        gpu::Rows { rows, factor: 1.0, form, count, cells: Some(cells) }
     }
 
     /// δp of every cell: as given in the mixed form, or k δv.

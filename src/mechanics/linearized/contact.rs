@@ -1,6 +1,7 @@
 //! The linearised forces of points in contact.
 
 use super::FunctionsAt;
+use crate::gpu::{self, Gpu};
 use crate::mechanics::contact::{Carrier, FreePoint};
 use crate::mechanics::sweep::Supports;
 use crate::tensor::{Tensor, Vector};
@@ -50,6 +51,25 @@ impl<const D: usize> ContactRows<D> {
     fn iter(&self) -> impl Iterator<Item = (&ContactRow<D>, &[(usize, f64)])> {
         let starts = std::iter::once(0).chain(self.ends.iter().copied());
         self.rows.iter().zip(starts.zip(&self.ends)).map(|(row, (start, &end))| (row, &self.weights[start..end]))
+    }
+
+    /// A copy on a device; `None` without a point.
+    pub(crate) fn on_device(&self, gpu: &Gpu, nodal: usize) -> Option<gpu::Points> {
+        let mut arrays = gpu::PointArrays { first: vec![0], obstacles: self.obstacles, ..gpu::PointArrays::default() };
+        let has_free = self.rows.iter().any(|row| row.on_free.is_some());
+        for (row, weights) in self.iter() {
+            arrays.nodes.extend(weights.iter().map(|&(node, _)| node as u32));
+            arrays.weights.extend(weights.iter().map(|&(_, weight)| weight));
+            arrays.first.push(arrays.nodes.len() as u32);
+            arrays.tangents.extend(row.tangent.iter());
+            arrays.on_free.push(row.on_free.as_ref().map_or(gpu::NO_OBSTACLE, |&(obstacle, _)| obstacle as u32));
+            if has_free {
+                let free = row.on_free.as_ref().map_or_else(FreePoint::zero, |(_, free)| *free);
+                arrays.of_motion.extend(free.of_motion.iter());
+                arrays.motion.extend(free.motion.iter());
+            }
+        }
+        gpu::Points::new(gpu, D, nodal, &arrays)
     }
 
     pub(crate) fn add_product(&self, u: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {

@@ -18,6 +18,7 @@ pub(crate) use contact::{ContactRow, ContactRows};
 pub(crate) use pressure::{PressureRow, PressureRows};
 pub(crate) use stress::StressRows;
 
+use crate::gpu::{self, Gpu};
 use crate::mechanics::effective::Function;
 use crate::mechanics::mass::Mass;
 use crate::mechanics::sweep::{At, Group, Mode, Quadratic, Supports};
@@ -121,6 +122,12 @@ impl<const D: usize> Linearized<D> {
         for (rows, changes) in self.cells.iter().zip(changes) {
             rows.add_product(changes, group, at, sums);
         }
+    }
+
+    /// The rows of laws and averaged cells on a device.
+    pub(crate) fn rows_on_device(&self, gpu: &Gpu, supports: &Supports<D>) -> Vec<gpu::Rows> {
+        let stresses = self.stresses.iter().map(|rows| rows.on_device(gpu, D));
+        stresses.chain(self.cells.iter().map(|cells| cells.on_device(gpu, supports))).collect()
     }
 
     /// Adds the diagonal blocks of the lumped mass.

@@ -1,6 +1,7 @@
 //! The linearised follower pressures of surface points.
 
 use super::FunctionsAt;
+use crate::gpu::{self, Gpu};
 use crate::mechanics::sweep::Supports;
 use crate::tensor::{Tensor, Vector, cofactor_derivative};
 
@@ -37,15 +38,37 @@ impl<const D: usize> PressureRows<D> {
 
     /// Column k of a block is N_I times the derivative along L = e_k ⊗ ∇_r N_I.
     pub(crate) fn add_blocks(&self, functions: &FunctionsAt<'_, D>, blocks: &mut [Tensor<f64, D>]) {
-        for PressureRow { particle, delta_f, force } in &self.0 {
-            for (node, function) in functions(*particle) {
+        for row in &self.0 {
+            for (node, function) in functions(row.particle) {
                 for k in 0..D {
-                    let mut l = Tensor::<f64, D>::zeros();
-                    l.set_row(k, &function.gradient[k].transpose());
-                    let column = cofactor_derivative(delta_f, &l) * force;
+                    let column = row.column(k, &function.gradient[k]);
                     (0..D).for_each(|i| blocks[node][(i, k)] += function.value[i] * column[i]);
                 }
             }
         }
+    }
+
+    /// A copy on a device; `None` without a point. There the product is a sum over nodes, and rounds in another order.
+    pub(crate) fn on_device(&self, gpu: &Gpu, supports: &Supports<D>) -> Option<gpu::Points> {
+        let mut arrays = gpu::PointArrays { first: vec![0], ..gpu::PointArrays::default() };
+        for row in &self.0 {
+            for (node, n, gradient) in supports.of(row.particle) {
+                arrays.nodes.push(node as u32);
+                arrays.weights.push(n);
+                (0..D).for_each(|k| arrays.blocks.extend(row.column(k, &gradient).iter()));
+            }
+            arrays.first.push(arrays.nodes.len() as u32);
+            arrays.on_free.push(gpu::NO_OBSTACLE);
+        }
+        gpu::Points::new(gpu, D, supports.nodes(), &arrays)
+    }
+}
+
+impl<const D: usize> PressureRow<D> {
+    /// The change of the force along L = e_k ⊗ ∇_r N.
+    fn column(&self, k: usize, gradient: &Vector<f64, D>) -> Vector<f64, D> {
+        let mut l = Tensor::<f64, D>::zeros();
+        l.set_row(k, &gradient.transpose());
+        cofactor_derivative(&self.delta_f, &l) * self.force
     }
 }

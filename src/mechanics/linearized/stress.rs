@@ -1,5 +1,6 @@
 //! The linearised tangents of the laws, as rows of numbers.
 
+use crate::gpu::{self, Gpu};
 use crate::lanes::LANES;
 use crate::mechanics::constitutive::{AddTo, Form, Product, add_quadratic, product};
 use crate::mechanics::sweep::{At, Group, Quadratic};
@@ -23,6 +24,12 @@ impl StressRows {
 
     pub(crate) fn times(self, factor: f64) -> Self {
         Self { factor: factor * self.factor, ..self }
+    }
+
+    /// A copy on a device.
+    pub(crate) fn on_device(&self, gpu: &Gpu, dimension: usize) -> gpu::Rows {
+        let rows = Arc::new(gpu.copy_of(self.rows.as_flattened()));
+        gpu::Rows { rows, factor: self.factor, form: self.form as i32, count: self.form.rows(dimension), cells: None }
     }
 
     #[inline(always)]

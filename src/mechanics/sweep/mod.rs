@@ -38,6 +38,7 @@ mod lattice;
 mod mode;
 mod number;
 mod numbering;
+mod on_device;
 mod order;
 mod passes;
 mod plain;

@@ -7,13 +7,14 @@ use super::points::{Points, SupportError};
 use super::tiled::Tiled;
 use crate::aggregation::Extension;
 use crate::approximation::ShapeFunction;
+use crate::gpu::{Gpu, Transfer};
 use crate::grid::Grid;
 use crate::pooled::{Element, Pool, Pooled};
 use crate::scalar::Real;
 use crate::space::{Nodes, Space};
 use crate::tensor::{Tensor, Vector};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, OnceLock};
 
 /// The shape-function values and the connectivity of all particles at the last grid reset, and the active nodes.
 ///
@@ -54,6 +55,10 @@ pub struct Supports<const D: usize> {
     pool: Pool,
     /// The extension u = E û by which outer nodes follow inner ones; `None` where every node is an unknown.
     extension: Option<Arc<Extension>>,
+    /// The device on which linear systems are solved.
+    pub(super) gpu: Option<Arc<Gpu>>,
+    /// The shape functions in its memory.
+    pub(super) on_device: OnceLock<Arc<Transfer>>,
 }
 
 /// An implementation of the loop over the particles.
@@ -182,7 +187,8 @@ impl<const D: usize> Supports<D> {
 
     fn of_implementation(implementation: Implementation<D>, grid: &Grid<D>, nodes: &Nodes, pool: &Pool) -> Self {
         let (nodes, passes, pool) = (nodes.clone(), AtomicU64::new(0), pool.clone());
-        Self { implementation, grid: *grid, nodes, fields: Vec::new(), passes, pool, extension: None }
+        let (fields, gpu, on_device) = (Vec::new(), None, OnceLock::new());
+        Self { implementation, grid: *grid, nodes, fields, passes, pool, extension: None, gpu, on_device }
     }
 
     /// These supports with an extension u = E û: outer nodes follow inner ones, and equilibria are solved for the inner nodes alone.

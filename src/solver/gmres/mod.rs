@@ -4,8 +4,8 @@
 mod tests;
 
 use super::{InvalidSetting, LinearError, LinearOperator, LinearOutcome, LinearReport, begin, true_residual};
-use crate::pooled::{Pool, Pooled};
-use crate::space::vector::{axpy, dot, norm, scaled};
+use crate::pooled::Pool;
+use crate::space::vector::Vectors;
 
 /// A vector is orthogonalised a second time if the first time leaves less than this part of it: 1/√2 (Daniel, Gragg, Kaufman,
 /// Stewart 1976).
@@ -78,115 +78,141 @@ pub fn gmres(
     settings: &GmresSettings,
     workspace: &Pool,
 ) -> Result<LinearReport, LinearError> {
-    InvalidSetting::check(settings.restart >= 1, "restart", settings.restart as f64, "at least 1")?;
-    let (mut report, b_norm) = begin(rhs, solution, settings.relative_tolerance)?;
-    if b_norm == 0.0 {
-        return Ok(report);
-    }
-    let target = settings.relative_tolerance * b_norm;
-    // More than n directions are never independent.
-    let mut restart = settings.restart.min(rhs.len());
-    let mut r = workspace.collect(rhs.iter().copied());
-    let mut r_norm = b_norm;
-    let mut trial = workspace.filled(rhs.len(), 0.0);
-    let mut correction = workspace.filled(rhs.len(), 0.0);
-    loop {
-        report.relative_residual = r_norm / b_norm;
-        if report.iterations >= settings.max_iterations {
-            report.outcome = LinearOutcome::IterationLimit;
+    settings.solve(workspace, operator, preconditioner, rhs, solution)
+}
+
+impl GmresSettings {
+    /// [`gmres`] where the vectors lie.
+    ///
+    /// # Errors
+    /// See [`gmres`].
+    pub fn solve<S: Vectors>(
+        &self,
+        vectors: &S,
+        operator: &dyn LinearOperator<S::Vector>,
+        preconditioner: &dyn LinearOperator<S::Vector>,
+        rhs: &S::Vector,
+        solution: &mut S::Vector,
+    ) -> Result<LinearReport, LinearError> {
+        InvalidSetting::check(self.restart >= 1, "restart", self.restart as f64, "at least 1")?;
+        let (mut report, b_norm) = begin(vectors, rhs, solution, self.relative_tolerance)?;
+        if b_norm == 0.0 {
             return Ok(report);
         }
-        let length = restart.min(settings.max_iterations - report.iterations);
-        let (taken, promised) =
-            cycle(operator, preconditioner, &r, r_norm, target, length, &mut correction).map_err(|at| {
+        let target = self.relative_tolerance * b_norm;
+        // More than n directions are never independent.
+        let n = vectors.len(rhs);
+        let mut restart = self.restart.min(n);
+        let mut r = vectors.copied(rhs);
+        let mut r_norm = b_norm;
+        let (mut trial, mut correction) = (vectors.zeros(n), vectors.zeros(n));
+        let step = Cycle { vectors, operator, preconditioner, target };
+        loop {
+            report.relative_residual = r_norm / b_norm;
+            if report.iterations >= self.max_iterations {
+                report.outcome = LinearOutcome::IterationLimit;
+                return Ok(report);
+            }
+            let length = restart.min(self.max_iterations - report.iterations);
+            let (taken, promised) = step.run(&r, r_norm, length, &mut correction).map_err(|at| {
                 LinearError::NotFinite { what: "the norm of a Krylov vector", iteration: report.iterations + at }
             })?;
-        report.iterations += taken;
-        report.products += taken;
-        trial.copy_from_slice(solution);
-        mutant!("solver: a restart of GMRES forgets the solution so far": { trial.fill(0.0); });
-        axpy(1.0, &correction, &mut trial);
-        let trial_norm = true_residual(operator, rhs, &trial, &mut r, &mut report)?;
-        let (before, fell) = (r_norm, trial_norm / r_norm);
-        if fell < 1.0 {
-            solution.copy_from_slice(&trial);
-            r_norm = trial_norm;
-            report.relative_residual = r_norm / b_norm;
-        } else {
-            true_residual(operator, rhs, solution, &mut r, &mut report)?;
-        }
-        if r_norm <= target {
-            return Ok(report);
-        }
-        let too_short = taken == length && promised > TOO_SHORT * before && length < rhs.len();
-        if too_short {
-            restart = (2 * restart).min(rhs.len());
-        } else if fell > STAGNATION {
-            report.outcome = LinearOutcome::Stagnated;
-            return Ok(report);
+            report.iterations += taken;
+            report.products += taken;
+            vectors.copy(solution, &mut trial);
+            mutant!("solver: a restart of GMRES forgets the solution so far": { vectors.clear(&mut trial); });
+            vectors.axpy(1.0, &correction, &mut trial);
+            let trial_norm = true_residual(vectors, operator, rhs, &trial, &mut r, &mut report)?;
+            let (before, fell) = (r_norm, trial_norm / r_norm);
+            if fell < 1.0 {
+                vectors.copy(&trial, solution);
+                r_norm = trial_norm;
+                report.relative_residual = r_norm / b_norm;
+            } else {
+                true_residual(vectors, operator, rhs, solution, &mut r, &mut report)?;
+            }
+            if r_norm <= target {
+                return Ok(report);
+            }
+            let too_short = taken == length && promised > TOO_SHORT * before && length < n;
+            if too_short {
+                restart = (2 * restart).min(n);
+            } else if fell > STAGNATION {
+                report.outcome = LinearOutcome::Stagnated;
+                return Ok(report);
+            }
         }
     }
 }
 
-/// One cycle of at most `length` iterations on the residual `r` of norm `r_norm`, until its norm is `target`. Writes the correction of x.
-/// Returns the number of iterations and the residual norm that the rotations predict.
-///
-/// # Errors
-/// The iteration at which a Krylov vector is not finite.
-fn cycle(
-    operator: &dyn LinearOperator,
-    preconditioner: &dyn LinearOperator,
-    r: &Pooled<f64>,
-    r_norm: f64,
+/// A system, and the norm of the residual at which a cycle ends.
+struct Cycle<'a, S: Vectors> {
+    vectors: &'a S,
+    operator: &'a dyn LinearOperator<S::Vector>,
+    preconditioner: &'a dyn LinearOperator<S::Vector>,
     target: f64,
-    length: usize,
-    correction: &mut [f64],
-) -> Result<(usize, f64), usize> {
-    let fresh = || r.pool().filled(r.len(), 0.0);
-    let mut v = fresh();
-    scaled(1.0 / r_norm, r, &mut v);
-    // The basis grows by one vector an iteration, so a cycle that ends early allocates no more than it needs.
-    let mut basis: Vec<Pooled<f64>> = Vec::new();
-    let mut triangle = Triangle { last: r_norm, ..Triangle::default() };
-    for iteration in 0..length {
-        let mut w = fresh();
-        // `correction` holds M⁻¹ v meanwhile.
-        preconditioner.apply(&v, correction);
-        operator.apply(correction, &mut w);
-        basis.push(v);
-        let w_norm = norm(&w);
-        if !w_norm.is_finite() {
-            return Err(iteration);
+}
+
+impl<S: Vectors> Cycle<'_, S> {
+    /// One cycle of at most `length` iterations on the residual `r` of norm `r_norm`. Writes the correction of x. Returns the number of
+    /// iterations and the residual norm that the rotations predict.
+    ///
+    /// # Errors
+    /// The iteration at which a Krylov vector is not finite.
+    fn run(
+        &self,
+        r: &S::Vector,
+        r_norm: f64,
+        length: usize,
+        correction: &mut S::Vector,
+    ) -> Result<(usize, f64), usize> {
+        let &Self { vectors, operator, preconditioner, target } = self;
+        let fresh = || vectors.zeros(vectors.len(r));
+        let mut v = fresh();
+        vectors.scaled(1.0 / r_norm, r, &mut v);
+        // The basis grows by one vector an iteration, so a cycle that ends early allocates no more than it needs.
+        let mut basis: Vec<S::Owned> = Vec::new();
+        let mut triangle = Triangle { last: r_norm, ..Triangle::default() };
+        for iteration in 0..length {
+            let mut w = fresh();
+            // `correction` holds M⁻¹ v meanwhile.
+            preconditioner.apply(&v, correction);
+            operator.apply(correction, &mut w);
+            basis.push(v);
+            let w_norm = vectors.norm(&w);
+            if !w_norm.is_finite() {
+                return Err(iteration);
+            }
+            let (column, left) = orthogonalise(vectors, &mut w, w_norm, &basis);
+            let exhausted = left <= EXHAUSTED * w_norm;
+            triangle.push(column, if exhausted { 0.0 } else { left });
+            if exhausted || triangle.residual() <= target {
+                break;
+            }
+            v = fresh();
+            vectors.scaled(1.0 / left, &w, &mut v);
         }
-        let (column, left) = orthogonalise(&mut w, w_norm, &basis);
-        let exhausted = left <= EXHAUSTED * w_norm;
-        triangle.push(column, if exhausted { 0.0 } else { left });
-        if exhausted || triangle.residual() <= target {
-            break;
+        let mut sum = fresh();
+        for (y, v) in triangle.solve().iter().zip(&basis) {
+            vectors.axpy(*y, v, &mut sum);
         }
-        v = fresh();
-        scaled(1.0 / left, &w, &mut v);
+        preconditioner.apply(&sum, correction);
+        Ok((basis.len(), triangle.residual()))
     }
-    let mut sum = fresh();
-    for (y, v) in triangle.solve().iter().zip(&basis) {
-        axpy(*y, v, &mut sum);
-    }
-    preconditioner.apply(&sum, correction);
-    Ok((basis.len(), triangle.residual()))
 }
 
 /// Removes from `w` its components along the orthonormal `basis`. Returns these components and the norm of the remainder.
-fn orthogonalise(w: &mut [f64], w_norm: f64, basis: &[Pooled<f64>]) -> (Vec<f64>, f64) {
+fn orthogonalise<S: Vectors>(vectors: &S, w: &mut S::Vector, w_norm: f64, basis: &[S::Owned]) -> (Vec<f64>, f64) {
     let mut column = vec![0.0; basis.len()];
     let mut before = w_norm;
     for _ in 0..2 {
         // hᵢ = w·vᵢ,  w ← w − hᵢ vᵢ
         for (h, v) in column.iter_mut().zip(basis) {
-            let part = dot(w, v);
+            let part = vectors.dot(w, v);
             *h += part;
-            axpy(-part, v, w);
+            vectors.axpy(-part, v, w);
         }
-        let left = norm(w);
+        let left = vectors.norm(w);
         if left > REORTHOGONALISE * before {
             return (column, left);
         }

@@ -1,6 +1,8 @@
 use super::super::testing::{Dense, distance, irregular};
 use super::super::{Identity, LinearOutcome};
 use super::*;
+use crate::pooled::Pooled;
+use crate::space::vector::{axpy, dot, norm};
 use std::cell::Cell;
 
 /// Solves with a memory pool of its own.
@@ -76,7 +78,7 @@ fn krylov_vectors_that_nearly_depend_on_each_other_are_orthogonal() {
     let mut w: Pooled<f64> = a.times(&[1.0; N]).into();
     for _ in 0..9 {
         let w_norm = norm(&w);
-        let (_, left) = orthogonalise(&mut w, w_norm, &basis);
+        let (_, left) = orthogonalise(&Pool::default(), &mut w, w_norm, &basis);
         assert!(left > EXHAUSTED * f64::EPSILON * w_norm, "the space is exhausted after {} vectors", basis.len());
         let v: Pooled<f64> = w.iter().map(|x| x / left).collect::<Vec<_>>().into();
         for before in &basis {

@@ -1,6 +1,7 @@
 //! The errors of Newton's method.
 
 use super::report::NewtonHistory;
+use crate::gpu::GpuError;
 use crate::solver::{InvalidSetting, LinearError, LinearReport};
 
 /// Newton's method found no solution. x is then the last accepted iterate.
@@ -84,9 +85,22 @@ pub enum NewtonFailure<E: std::error::Error + 'static> {
     LinearSolverFailed(#[from] LinearSolverFailure),
 }
 
+impl<E: std::error::Error + 'static> NewtonFailure<E> {
+    /// Whether the device failed on which linear systems are solved.
+    pub(crate) fn is_of_device(&self) -> bool {
+        matches!(self, Self::LinearSolverFailed(LinearSolverFailure::Device(_)))
+    }
+}
+
 /// The failure of a linear solve to give a useful step.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum LinearSolverFailure {
+    /// The device failed.
+    #[error(transparent)]
+    Device(#[from] GpuError),
+    /// The preconditioner has no form for devices.
+    #[error("this preconditioner does not run on a GPU; run without --gpu")]
+    NotOnDevice,
     /// The Krylov method returned an error.
     #[error(transparent)]
     Error(#[from] LinearError),

@@ -10,12 +10,12 @@ pub use failure::{LinearSolverFailure, NewtonError, NewtonFailure};
 pub use report::{Convergence, Merit, NewtonCounts, NewtonHistory, NewtonIteration, NewtonReport};
 pub use settings::{Krylov, NewtonSettings};
 
-use super::conjugate_gradient::{ConjugateGradientSettings, conjugate_gradient};
+use super::conjugate_gradient::ConjugateGradientSettings;
 use super::forcing::LOOSEST;
-use super::gmres::{GmresSettings, gmres};
+use super::gmres::GmresSettings;
 use super::{LinearOperator, LinearOutcome, LinearReport, Linearization, NonlinearProblem, Preconditioner};
 use crate::pooled::{Pool, Pooled};
-use crate::space::vector::{dot, norm, xpby};
+use crate::space::vector::{Vectors, dot, norm, xpby};
 use settings::DEFAULT_RESTART;
 
 /// The part of the predicted decrease that a step must achieve (Armijo).
@@ -82,6 +82,13 @@ pub fn newton<E: std::error::Error + 'static>(
         Ok(convergence) => Ok(NewtonReport { convergence, history: newton.history }),
         Err(cause) => Err(NewtonError { cause, history: Box::new(newton.history) }),
     }
+}
+
+/// A linear system with an approximate inverse, and the place of its vectors.
+struct System<'a, S: Vectors> {
+    vectors: &'a S,
+    tangent: &'a dyn LinearOperator<S::Vector>,
+    inverse: &'a dyn LinearOperator<S::Vector>,
 }
 
 struct Newton<'a, E> {
@@ -168,8 +175,7 @@ impl<E: std::error::Error + 'static> Newton<'_, E> {
             let inadmissible = |source| NewtonFailure::Inadmissible { iteration, source };
             let problem = self.problem;
             let tangent = problem.linearize(self.x).map_err(inadmissible)?;
-            let inverse = preconditioner.prepare(&*tangent);
-            self.solve(&*tangent, &*inverse, forcing)?
+            self.solve(&*tangent, preconditioner, forcing)?
         };
         let Some((step_length, residual, merit)) = self.search(&d, krylov.relative_residual)? else {
             return Ok(None);
@@ -187,31 +193,61 @@ impl<E: std::error::Error + 'static> Newton<'_, E> {
     fn solve(
         &mut self,
         tangent: &dyn Linearization,
-        inverse: &dyn LinearOperator,
+        preconditioner: &mut dyn Preconditioner,
         relative_tolerance: f64,
     ) -> Result<(Pooled<f64>, LinearReport), LinearSolverFailure> {
-        let pool = self.r.pool();
+        let pool = self.r.pool().clone();
         let size = self.residual.log2().floor().exp2();
         let rhs = pool.collect(self.r.iter().map(|r| -r / size));
         let mut d = pool.filled(rhs.len(), 0.0);
+        let krylov = match tangent.on_device() {
+            None => {
+                let inverse = &*preconditioner.prepare(tangent);
+                self.solve_in(&System { vectors: &pool, tangent, inverse }, &rhs, &mut d, relative_tolerance)?
+            }
+            Some(system) => {
+                let vectors = &**system.gpu();
+                let inverse = preconditioner.prepare_on_device(tangent, &*system);
+                let inverse = &*inverse.ok_or(LinearSolverFailure::NotOnDevice)?;
+                let (rhs, mut on_device) = (vectors.vector(&rhs), vectors.zeros(rhs.len()));
+                let system = System { vectors, tangent: &*system, inverse };
+                let krylov = self.solve_in(&system, &rhs, &mut on_device, relative_tolerance);
+                d.copy_from_slice(&vectors.numbers(&on_device));
+                // After a failure of the device, numbers are NaN.
+                vectors.check()?;
+                krylov?
+            }
+        };
+        d.iter_mut().for_each(|d| *d *= size);
+        Ok((d, krylov))
+    }
+
+    /// Step 3 where the vectors lie.
+    fn solve_in<S: Vectors>(
+        &mut self,
+        &System { vectors, tangent, inverse }: &System<'_, S>,
+        rhs: &S::Vector,
+        d: &mut S::Vector,
+        relative_tolerance: f64,
+    ) -> Result<LinearReport, LinearSolverFailure> {
         let max_iterations = self.settings.max_krylov_iterations;
         let (restart, descended) = match self.settings.krylov.chosen(self.problem.is_symmetric()) {
             Krylov::Gmres { restart } => (restart, None),
             Krylov::Automatic | Krylov::ConjugateGradient => {
                 let settings = ConjugateGradientSettings { relative_tolerance, max_iterations };
-                let report = conjugate_gradient(tangent, inverse, &rhs, &mut d, &settings, pool)?;
+                let report = settings.solve(vectors, tangent, inverse, rhs, d)?;
                 self.history.counts.add(&report);
                 (DEFAULT_RESTART, Some(report))
             }
         };
         let negative = descended.is_some_and(|report| report.outcome == LinearOutcome::NegativeCurvature);
         // −R·d > 0: the potential falls along the truncated step.
-        let truncated = negative && dot(&rhs, &d) > 0.0 && self.problem.potential(self.x).is_some();
+        let truncated = negative && vectors.dot(rhs, d) > 0.0 && self.problem.potential(self.x).is_some();
         let krylov = match descended {
             Some(report) if !negative || truncated => report,
             _ => {
                 let settings = GmresSettings { relative_tolerance, max_iterations, restart: restart as usize };
-                let report = gmres(tangent, inverse, &rhs, &mut d, &settings, pool)?;
+                let report = settings.solve(vectors, tangent, inverse, rhs, d)?;
                 self.history.counts.add(&report);
                 report
             }
@@ -220,8 +256,7 @@ impl<E: std::error::Error + 'static> Newton<'_, E> {
         if krylov.relative_residual >= LOOSEST && !truncated {
             return Err(LinearSolverFailure::NoProgress { report: krylov, wanted: relative_tolerance });
         }
-        d.iter_mut().for_each(|d| *d *= size);
-        Ok((d, krylov))
+        Ok(krylov)
     }
 
     /// Steps 4 to 6: the step length along d, the ‖R‖ reached and the merit function that accepts it. The accepted iterate and its residual are

@@ -1,10 +1,12 @@
 //! Block-Jacobi: the inverses of the blocks on the diagonal.
 
 use super::Preconditioner;
+use crate::gpu::{Buffer, Gpu, GpuVector};
 use crate::parallel;
 use crate::pooled::Pooled;
-use crate::solver::{LinearOperator, Linearization};
+use crate::solver::{LinearOperator, Linearization, OnDevice};
 use crate::tensor::{Tensor, Vector, determinant, inverse};
+use std::sync::Arc;
 
 /// Block-Jacobi: the inverse D×D diagonal blocks of the first tangent it is prepared with, one block for each node. They are made once a
 /// step, since they cost as much as a few products and change little in a step. Before that it is the identity.
@@ -14,6 +16,8 @@ use crate::tensor::{Tensor, Vector, determinant, inverse};
 pub struct BlockJacobi<const D: usize> {
     /// One block after the other, column by column.
     inverse: Pooled<f64>,
+    /// Its copy on a device.
+    on_device: Option<Arc<Buffer<f64>>>,
 }
 
 impl<const D: usize> BlockJacobi<D> {
@@ -42,6 +46,31 @@ impl<const D: usize> Preconditioner for BlockJacobi<D> {
     fn prepare<'a>(&'a mut self, tangent: &'a dyn Linearization) -> Box<dyn LinearOperator + 'a> {
         self.take(tangent);
         Box::new(&*self)
+    }
+
+    fn prepare_on_device<'a>(
+        &'a mut self,
+        tangent: &'a dyn Linearization,
+        system: &'a dyn OnDevice,
+    ) -> Option<Box<dyn LinearOperator<GpuVector> + 'a>> {
+        self.take(tangent);
+        let (inverse, gpu) = (&self.inverse, system.gpu());
+        let inverse = self.on_device.get_or_insert_with(|| Arc::new(gpu.copy_of(inverse)));
+        Some(Box::new(DeviceBlocks { gpu, inverse, dimension: D }))
+    }
+}
+
+/// Diagonal blocks on a device.
+#[derive(Clone, Copy)]
+pub(super) struct DeviceBlocks<'a> {
+    pub gpu: &'a Gpu,
+    pub inverse: &'a Buffer<f64>,
+    pub dimension: usize,
+}
+
+impl LinearOperator<GpuVector> for DeviceBlocks<'_> {
+    fn apply(&self, r: &GpuVector, z: &mut GpuVector) {
+        self.gpu.multiply_blocks(self.inverse, self.dimension, r, z);
     }
 }
 

@@ -1,8 +1,7 @@
 //! Chebyshev polynomials over block-Jacobi, and the largest eigenvalue that they need.
 
-use crate::pooled::Pool;
 use crate::solver::LinearOperator;
-use crate::space::vector::{axpy, dot, scaled, update, update_pair, xpby};
+use crate::space::vector::{Vectors, axpy, dot, xpby};
 use nalgebra::DMatrix;
 
 /// A Chebyshev polynomial.
@@ -68,41 +67,39 @@ pub(super) fn largest(operator: &dyn LinearOperator, jacobi: &dyn Fn(&[f64], &mu
     if largest > 0.0 { largest } else { 1.0 }
 }
 
-/// Smooths: x ← x + p(D⁻¹K) D⁻¹ (b − K x) with a Chebyshev polynomial p. `zero` tells that x = 0 at the start, which saves a product. Vectors
-/// come from `pool`.
-pub(super) fn smooth(
+/// A product with an approximate inverse, such as that of the diagonal blocks.
+pub(super) type Inverse<'a, V> = dyn Fn(&V, &mut V) + 'a;
+
+/// Smooths: x ← x + p(D⁻¹K) D⁻¹ (b − K x) with a Chebyshev polynomial p. `zero` tells that x = 0 at the start, which saves a product.
+pub(super) fn smooth<S: Vectors>(
     Chebyshev { degree, part, largest }: Chebyshev,
-    operator: &dyn LinearOperator,
-    jacobi: &dyn Fn(&[f64], &mut [f64]),
-    b: &[f64],
-    x: &mut [f64],
+    vectors: &S,
+    operator: &dyn LinearOperator<S::Vector>,
+    jacobi: &Inverse<'_, S::Vector>,
+    b: &S::Vector,
+    x: &mut S::Vector,
     zero: bool,
-    pool: &Pool,
 ) {
-    let n = b.len();
     let (upper, lower) = (largest, largest / part);
     let (theta, delta) = (0.5 * (upper + lower), 0.5 * (upper - lower));
     let sigma = theta / delta;
-    let [mut r, mut z, mut p] = [(); 3].map(|()| pool.unspecified(n, 0.0));
+    let [mut r, mut z, mut p] = [(); 3].map(|()| vectors.unspecified(vectors.len(b)));
     if zero {
-        scaled(1.0, b, &mut r);
+        vectors.copy(b, &mut r);
     } else {
         operator.apply(x, &mut r);
-        xpby(b, -1.0, &mut r);
+        vectors.xpby(b, -1.0, &mut r);
     }
     jacobi(&r, &mut z);
-    update(&z, &mut p, |z, _| z / theta);
+    vectors.divided(&z, theta, &mut p);
     let mut rho = 1.0 / sigma;
     for _ in 1..degree {
         operator.apply(&p, &mut z);
-        update_pair([&p, &z], x, &mut r, |[p, z], x, r| {
-            *x += p;
-            *r -= z;
-        });
+        vectors.move_along(&p, &z, x, &mut r);
         jacobi(&r, &mut z);
         let next = 1.0 / (2.0 * sigma - rho);
-        update(&z, &mut p, |z, p| next * rho * p + 2.0 * next / delta * z);
+        vectors.axpby(2.0 * next / delta, &z, next * rho, &mut p);
         rho = next;
     }
-    axpy(1.0, &p, x);
+    vectors.axpy(1.0, &p, x);
 }

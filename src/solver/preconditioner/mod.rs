@@ -12,7 +12,8 @@ pub use multigrid::{LocalForm, Multigrid};
 pub(crate) use saddle::bytes as saddle_bytes;
 pub use saddle::{PressureCells, Saddle};
 
-use super::{LinearOperator, Linearization};
+use super::{LinearOperator, Linearization, OnDevice};
+use crate::gpu::{Gpu, GpuVector};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt::{Display, Formatter};
@@ -51,6 +52,16 @@ use std::fmt::{Display, Formatter};
 pub trait Preconditioner {
     /// The approximate inverse of a tangent. It may be made from an earlier tangent of the step.
     fn prepare<'a>(&'a mut self, tangent: &'a dyn Linearization) -> Box<dyn LinearOperator + 'a>;
+
+    /// [`Self::prepare`] on the device of `system`, which is the tangent there; `None` if this preconditioner has no form for devices.
+    fn prepare_on_device<'a>(
+        &'a mut self,
+        tangent: &'a dyn Linearization,
+        system: &'a dyn OnDevice,
+    ) -> Option<Box<dyn LinearOperator<GpuVector> + 'a>> {
+        let _ = (tangent, system);
+        None
+    }
 }
 
 /// The preconditioner of the linear systems.
@@ -117,8 +128,25 @@ impl LinearOperator for Identity {
     }
 }
 
+/// The identity on a device.
+struct DeviceIdentity<'a>(&'a Gpu);
+
+impl LinearOperator<GpuVector> for DeviceIdentity<'_> {
+    fn apply(&self, r: &GpuVector, z: &mut GpuVector) {
+        self.0.copy(&r.0, &mut z.0);
+    }
+}
+
 impl Preconditioner for Identity {
     fn prepare<'a>(&'a mut self, _: &'a dyn Linearization) -> Box<dyn LinearOperator + 'a> {
         Box::new(Self)
+    }
+
+    fn prepare_on_device<'a>(
+        &'a mut self,
+        _: &'a dyn Linearization,
+        system: &'a dyn OnDevice,
+    ) -> Option<Box<dyn LinearOperator<GpuVector> + 'a>> {
+        Some(Box::new(DeviceIdentity(system.gpu())))
     }
 }

@@ -3,6 +3,7 @@
 //! with Q ≈ Π_axes ([1 4 1]/6)⁻¹ amplifies them: M = D⁻¹ + D^{−½} Q Qᵀ D^{−½} takes the place of D⁻¹.
 
 use super::form::LocalForm;
+use crate::gpu::{self, Gpu};
 use crate::parallel;
 use crate::pooled::Pool;
 use crate::tensor::{Tensor, Vector};
@@ -67,6 +68,19 @@ impl Lines {
         lines
     }
 
+    /// The neighbours before and behind each node.
+    fn neighbours(&self) -> [Vec<u32>; 2] {
+        let mut neighbours = [vec![NONE; self.places.len()], vec![NONE; self.places.len()]];
+        let mut nodes = &self.nodes[..];
+        for line in self.lengths.iter().filter_map(|&length| nodes.split_off(..length as usize)) {
+            for pair in line.windows(2) {
+                neighbours[0][pair[1] as usize] = pair[0];
+                neighbours[1][pair[0] as usize] = pair[1];
+            }
+        }
+        neighbours
+    }
+
     /// Calls `fill` and then inverts `times` times, for parts of whole lines.
     fn invert<const D: usize>(&self, times: usize, x: &mut [Vector<f64, D>], fill: &Fill<'_, D>) {
         let (mut left, mut nodes, mut lengths) = (x, &self.nodes[..], &self.lengths[..]);
@@ -93,11 +107,16 @@ impl Lines {
     }
 }
 
-/// x ← q(B) x with B = [1 4 1]/6 along a line, and the polynomial q ≈ 1/B.
-fn invert<const D: usize>(x: &mut [Vector<f64, D>], [r, p]: &mut [Vec<Vector<f64, D>>; 2]) {
+/// θ, σ and δ of the Chebyshev iteration.
+fn coefficients() -> [f64; 3] {
     let [lower, upper] = SPECTRUM;
     let (theta, delta) = (0.5 * (upper + lower), 0.5 * (upper - lower));
-    let sigma = theta / delta;
+    [theta, theta / delta, delta]
+}
+
+/// x ← q(B) x with B = [1 4 1]/6 along a line, and the polynomial q ≈ 1/B.
+fn invert<const D: usize>(x: &mut [Vector<f64, D>], [r, p]: &mut [Vec<Vector<f64, D>>; 2]) {
+    let [theta, sigma, delta] = coefficients();
     let mut rho = 1.0 / sigma;
     r.clear();
     r.extend_from_slice(x);
@@ -139,6 +158,21 @@ impl Filter {
             unit,
             pool: Pool::default(),
         }
+    }
+
+    /// A copy on a device.
+    pub(crate) fn on_device(&self, gpu: &Gpu, dimension: usize) -> gpu::Filter {
+        let neighbours: Vec<_> = self.lines[..dimension].iter().map(Lines::neighbours).collect();
+        let [theta, sigma, delta] = coefficients();
+        let mut rho = 1.0 / sigma;
+        let step = |_| {
+            let next = 1.0 / (2.0 * sigma - rho);
+            let step = [next * rho, 2.0 * next / delta];
+            rho = next;
+            step
+        };
+        let steps = (1..STEPS).map(step).collect();
+        gpu::Filter::new(gpu, &neighbours, &self.scale, self.unit, (theta, steps))
     }
 
     /// z += D^{−½} Q Qᵀ D^{−½} r

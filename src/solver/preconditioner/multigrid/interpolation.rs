@@ -78,6 +78,11 @@ impl Interpolation {
         (0..self.around.len()).map(|fine| self.row(fine))
     }
 
+    /// Starts and entries of the coarse nodes around each finer node, and of the finer nodes of each coarse node.
+    pub(crate) fn lists(&self) -> [[&[u32]; 2]; 2] {
+        [&self.around, &self.within].map(|lists| [&*lists.starts, &*lists.entries])
+    }
+
     fn row(&self, fine: usize) -> (&[u32], f64) {
         let list = self.around.of(fine);
         // The number of corners is a power of two.

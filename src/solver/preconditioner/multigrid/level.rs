@@ -1,8 +1,11 @@
 //! A coarse grid: hat functions, the tangent on them as stencils, restriction to the grid and interpolation from it.
 
+use super::cycle::Coarse;
 use super::form::LocalForm;
 use super::interpolation::Interpolation;
+use crate::gpu::{self, Gpu};
 use crate::parallel;
+use crate::pooled::{Pool, Pooled};
 use crate::solver::LinearOperator;
 use crate::solver::preconditioner::block_jacobi::multiply_blocks;
 use crate::solver::preconditioner::chebyshev::largest;
@@ -291,24 +294,44 @@ impl<const D: usize> Level<D> {
         matrix
     }
 
-    /// z = D⁻¹ r
-    pub(crate) fn precondition(&self, r: &[f64], z: &mut [f64]) {
+    /// A copy on a device.
+    pub(crate) fn on_device(&self, gpu: &Gpu) -> gpu::Level {
+        let [around, within] = self.interpolation.lists();
+        let arrays = gpu::LevelArrays {
+            dimension: D,
+            neighbours: &self.neighbours,
+            entries: bytemuck::cast_slice(&self.entries),
+            inverse: bytemuck::cast_slice(&self.inverse),
+            held: &self.held,
+            fixed_finer: &self.fixed_finer,
+            around,
+            within,
+            followers: self.followers.on_device(gpu),
+        };
+        gpu::Level::new(gpu, arrays)
+    }
+}
+
+impl<const D: usize> Coarse<Pool> for Level<D> {
+    fn precondition(&self, r: &[f64], z: &mut [f64]) {
         multiply_blocks(&self.inverse, r, z);
     }
 
-    /// Eᵀ Pᵀ r
-    pub(crate) fn restrict(&self, r: &[f64]) -> Vec<f64> {
+    fn restrict(&self, r: &[f64]) -> Pooled<f64> {
         let mut out = self.interpolation.restrict::<D>(&self.fixed_finer, bytemuck::cast_slice(r));
         self.followers.restrict::<f64>(&mut out);
-        let mut out = bytemuck::allocation::cast_vec(out);
+        let mut out: Vec<f64> = bytemuck::allocation::cast_vec(out);
         out.iter_mut().zip(&self.held).filter(|(_, held)| **held).for_each(|(out, _)| *out = 0.0);
-        out
+        out.into()
     }
 
-    /// x += P E y
-    pub(crate) fn prolong(&self, mut y: Vec<f64>, x: &mut [f64]) {
+    fn prolong(&self, mut y: Pooled<f64>, x: &mut [f64]) {
         self.followers.extend::<f64>(bytemuck::cast_slice_mut(&mut y));
         let (y, x) = (bytemuck::cast_slice(&y), bytemuck::cast_slice_mut(x));
         self.interpolation.prolong::<D>(&self.fixed_finer, y, x);
+    }
+
+    fn largest(&self) -> f64 {
+        self.largest
     }
 }

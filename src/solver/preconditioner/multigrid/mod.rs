@@ -8,22 +8,28 @@
 //! - Chebyshev polynomials over block-Jacobi smooth before and after the coarse correction. Both smoothers are equal, so the cycle is
 //!   symmetric where the tangent is.
 
+mod cycle;
 mod filter;
 mod form;
 mod interpolation;
 mod level;
+mod on_device;
 mod rigid;
 
 pub use form::LocalForm;
 
-use super::chebyshev::{Chebyshev, largest, smooth};
+use super::chebyshev::largest;
 use super::{BlockJacobi, Preconditioner};
+use crate::gpu::GpuVector;
 use crate::pooled::Pool;
-use crate::solver::{LinearOperator, Linearization};
-use crate::space::vector::xpby;
+use crate::solver::{LinearOperator, Linearization, OnDevice};
+use crate::space::vector::Vectors;
+use cycle::{Coarse, Cycle};
 use filter::Filter;
 use level::Level;
 use nalgebra::{DVector, Dyn, LU};
+use on_device::DeviceLevels;
+use std::sync::Arc;
 
 /// Coarsening ends at a level with at most this many unknowns, which is factorised.
 const BOTTOM: usize = 400;
@@ -40,6 +46,8 @@ pub struct Multigrid<const D: usize> {
     largest: f64,
     levels: Vec<Level<D>>,
     bottom: Option<LU<f64, Dyn, Dyn>>,
+    /// Blocks, filter and levels on a device.
+    on_device: Option<Arc<DeviceLevels>>,
 }
 
 /// Bytes of the coarse levels for a finest level of `nodes` nodes, and of the [`LocalForm`] that they are made from.
@@ -84,59 +92,60 @@ impl<const D: usize> Multigrid<D> {
         }
     }
 
-    /// The approximate solution of level `from` and all coarser levels, for the right-hand side b.
-    fn coarse(&self, from: usize, b: &[f64]) -> Vec<f64> {
-        let level = &self.levels[from];
-        let mut x = vec![0.0; b.len()];
-        if from + 1 == self.levels.len() {
-            match self.bottom.as_ref().and_then(|lu| lu.solve(&DVector::from_column_slice(b))) {
-                Some(solved) => x.copy_from_slice(solved.as_slice()),
-                None => level.precondition(b, &mut x),
-            }
-            return x;
+    /// The solution of the last level.
+    fn solve_bottom(&self, b: &[f64], x: &mut [f64]) {
+        match (self.bottom.as_ref().and_then(|lu| lu.solve(&DVector::from_column_slice(b))), self.levels.last()) {
+            (Some(solved), _) => x.copy_from_slice(solved.as_slice()),
+            (None, Some(level)) => level.precondition(b, x),
+            (None, None) => x.copy_from_slice(b),
         }
-        let jacobi = |r: &[f64], z: &mut [f64]| level.precondition(r, z);
-        smooth(Chebyshev::smoother(level.largest), level, &jacobi, b, &mut x, true, &self.pool);
-        self.correct(from + 1, level, b, &mut x);
-        smooth(Chebyshev::smoother(level.largest), level, &jacobi, b, &mut x, false, &self.pool);
-        x
     }
 
-    /// Adds to x the correction of level `to` for the residual b − K x.
-    fn correct(&self, to: usize, operator: &dyn LinearOperator, b: &[f64], x: &mut [f64]) {
-        let Some(level) = self.levels.get(to) else { return };
-        let mut r = self.pool.unspecified(b.len(), 0.0);
-        operator.apply(x, &mut r);
-        xpby(b, -1.0, &mut r);
-        level.prolong(self.coarse(to, &level.restrict(&r)), x);
-    }
-}
-
-/// A V-cycle whose finest level is the present tangent.
-struct Cycle<'a, const D: usize> {
-    levels: &'a Multigrid<D>,
-    tangent: &'a dyn Linearization,
-}
-
-impl<const D: usize> LinearOperator for Cycle<'_, D> {
-    fn apply(&self, r: &[f64], z: &mut [f64]) {
-        let Self { levels, tangent } = *self;
-        let jacobi = |r: &[f64], z: &mut [f64]| levels.filtered(r, z);
-        z.fill(0.0);
-        smooth(Chebyshev::smoother(levels.largest), tangent, &jacobi, r, z, true, &levels.pool);
-        mutant!("multigrid: no coarse levels": { return smooth(Chebyshev::smoother(levels.largest), tangent, &jacobi, r, z, false, &levels.pool); });
-        levels.correct(0, tangent, r, z);
-        mutant!("multigrid: no smoothing after the coarse levels": { return; });
-        smooth(Chebyshev::smoother(levels.largest), tangent, &jacobi, r, z, false, &levels.pool);
+    /// Makes blocks and levels of the first tangent.
+    fn take(&mut self, tangent: &dyn Linearization) {
+        if self.levels.is_empty() {
+            self.blocks.take(tangent);
+            self.build(tangent.local_form(), tangent);
+        }
     }
 }
 
 impl<const D: usize> Preconditioner for Multigrid<D> {
     fn prepare<'a>(&'a mut self, tangent: &'a dyn Linearization) -> Box<dyn LinearOperator + 'a> {
-        if self.levels.is_empty() {
-            self.blocks.take(tangent);
-            self.build(tangent.local_form(), tangent);
+        self.take(tangent);
+        let this = &*self;
+        Box::new(Cycle {
+            vectors: &this.pool,
+            tangent,
+            smoother: Box::new(|r, z| this.filtered(r, z)),
+            largest: this.largest,
+            levels: this.levels.iter().map(|level| level as &dyn Coarse<Pool>).collect(),
+            bottom: Box::new(|b, x| this.solve_bottom(b, x)),
+        })
+    }
+
+    fn prepare_on_device<'a>(
+        &'a mut self,
+        tangent: &'a dyn Linearization,
+        system: &'a dyn OnDevice,
+    ) -> Option<Box<dyn LinearOperator<GpuVector> + 'a>> {
+        self.take(tangent);
+        let vectors = &**system.gpu();
+        if self.on_device.is_none() {
+            self.on_device = Some(Arc::new(DeviceLevels::of(system.gpu(), self)));
         }
-        Box::new(Cycle { levels: self, tangent })
+        let (this, levels) = (&*self, self.on_device.as_deref()?);
+        Some(Box::new(Cycle {
+            vectors,
+            tangent: system,
+            smoother: Box::new(|r, z| levels.smooth(vectors, r, z)),
+            largest: this.largest,
+            levels: levels.coarse(),
+            bottom: Box::new(|b, x| {
+                let mut solved = vec![0.0; vectors.len(b)];
+                this.solve_bottom(&vectors.numbers(b), &mut solved);
+                vectors.write_at(&solved, &mut x.0, 0);
+            }),
+        }))
     }
 }

@@ -202,7 +202,7 @@ impl<const D: usize> Schur<D> {
     pub(super) fn solve(&self, v: &[f64], q: &mut [f64]) {
         let inverted = |part: &Coupled<D>| {
             let (mut q, polynomial) = (vec![0.0; v.len()], Chebyshev { largest: part.largest, ..self.polynomial });
-            smooth(polynomial, &Sum(self, part), &|r, z| part.scale(r, z), v, &mut q, true, &self.pool);
+            smooth(polynomial, &self.pool, &Sum(self, part), &|r, z| part.scale(r, z), v, &mut q, true);
             q
         };
         q.iter_mut().zip(v).zip(&self.alone).for_each(|((q, v), alone)| *q = v / alone);

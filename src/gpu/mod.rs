@@ -1,0 +1,23 @@
+//! A graphics processor: its memory, its kernels, and vectors that lie there.
+//!
+//! The program finds the driver when it runs, so that it also runs on machines without one. The kernels are CUDA C (`kernels/`), and are shipped
+//! as PTX, which every driver since CUDA 12.0 compiles for its device. `.ci/ptx` writes the PTX.
+//!
+//! Every sum has the order that it has on the processor, so that both give the same bits, whichever thread or block is first.
+//!
+//! The tests run the kernels on a driver that is emulated by gcc (`tests/gpu/`).
+
+mod device;
+mod multigrid;
+mod points;
+mod product;
+#[cfg(test)]
+mod record;
+mod vectors;
+
+pub(crate) use device::Buffer;
+pub use device::{Gpu, GpuError};
+pub(crate) use multigrid::{Filter, Level, LevelArrays};
+pub(crate) use points::{NO_OBSTACLE, PointArrays, Points};
+pub(crate) use product::{Cells, Followers, Masses, Product, Rows, Transfer, TransferArrays};
+pub use vectors::GpuVector;

@@ -1,0 +1,47 @@
+//! Linear systems on a GPU, and the parts of a simulation that do not run there yet.
+
+use super::Simulation;
+use crate::approximation::ShapeFunction;
+use crate::gpu::{Gpu, GpuError};
+use crate::material::Law;
+use std::sync::Arc;
+
+impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
+    /// Solves the linear systems of all further steps on the GPU of this machine.
+    ///
+    /// ```
+    /// use bfree::gpu::GpuError;
+    ///
+    /// let mut simulation = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?.build::<2>("scenes".as_ref())?;
+    /// match simulation.use_gpu() {
+    ///     Ok(()) => assert!(simulation.settings.gpu.is_some()),
+    ///     Err(GpuError::NoDriver) => println!("no driver: the processor solves them"),
+    ///     Err(other) => return Err(other.into()),
+    /// }
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// A part of the simulation does not run there, or there is no device.
+    pub fn use_gpu(&mut self) -> Result<(), GpuError> {
+        self.check_gpu()?;
+        self.settings.gpu = Some(Arc::new(Gpu::open()?));
+        Ok(())
+    }
+
+    /// Whether the linear systems can be solved on a GPU.
+    ///
+    /// # Errors
+    /// The first part that cannot.
+    pub(crate) fn check_gpu(&self) -> Result<(), GpuError> {
+        let refused = |part, cure| Err(GpuError::NotYet { part, cure });
+        if self.approximation.separable().is_none() {
+            return refused("LME functions on a circle of nodes do", "take \"support\": \"separable\"");
+        }
+        if self.is_mixed() {
+            let cure = "set solver.krylov.preconditioner to \"block_jacobi\"";
+            return refused("unknowns for the dilatations of cells do", cure);
+        }
+        Ok(())
+    }
+}

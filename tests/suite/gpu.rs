@@ -1,0 +1,279 @@
+//! The GPU: its product and its solver against those of the processor. The kernels run on a driver that gcc makes of them
+//! (`tests/gpu/driver.c`), with threads and blocks as loops in three orders. The program finds it like the real one.
+
+use crate::support::{Failure, Said, said};
+use bfree::gpu::Gpu;
+use bfree::mechanics::check::direction;
+use bfree::solver::Linearization;
+use bfree::space::vector::Vectors;
+use bfree::tensor::Vector;
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::sync::{Arc, OnceLock};
+
+/// The orders in which the emulated driver runs threads and blocks.
+const ORDERS: [&str; 3] = ["forward", "backward", "scrambled"];
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// The folder of the emulated driver, which is compiled once.
+fn emulator() -> &'static Path {
+    static FOLDER: OnceLock<PathBuf> = OnceLock::new();
+    FOLDER.get_or_init(|| {
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("emulated-gpu-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let mut gcc = Command::new("gcc");
+        gcc.current_dir(root()).args(["-std=gnu11", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-DEMULATED"]);
+        // A product and a sum are rounded once, as by the library's lanes.
+        gcc.args(cfg!(target_arch = "x86_64").then_some("-mfma"));
+        gcc.args(["-I", "src/gpu/kernels", "tests/gpu/driver.c", "-x", "c", "src/gpu/kernels/kernels.cu", "-o"]);
+        let made = gcc.arg(folder.join("libcuda.so")).output().unwrap();
+        assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
+        folder
+    })
+}
+
+/// A command that finds the emulated driver.
+fn emulated(program: &Path, order: &str) -> Command {
+    let mut command = Command::new(program);
+    command.stdin(Stdio::null()).env("LD_LIBRARY_PATH", emulator()).env("BFREE_GPU_ORDER", order);
+    command
+}
+
+/// Runs this test again, in processes that find the emulated driver. Returns whether this is such a process.
+fn is_emulated(test: &str) -> bool {
+    if std::env::var_os("BFREE_EMULATED").is_some() {
+        return true;
+    }
+    for order in ORDERS {
+        let mut again = emulated(&std::env::current_exe().unwrap(), order);
+        let said = again.args([&format!("gpu::{test}"), "--exact", "--nocapture"]).env("BFREE_EMULATED", "1").output();
+        let said = said.unwrap();
+        let text = [said.stdout, said.stderr].map(|text| String::from_utf8_lossy(&text).into_owned()).concat();
+        assert!(said.status.success() && text.contains("1 passed"), "{order}: {text}");
+    }
+    false
+}
+
+fn bfree() -> &'static Path {
+    Path::new(env!("CARGO_BIN_EXE_bfree"))
+}
+
+/// Runs a scene into a directory.
+fn run(command: &mut Command, scene: &str, out: &Path, arguments: &[&str]) -> Result<Said, Failure> {
+    let scene = root().join("scenes").join(scene);
+    said(
+        command
+            .arg("run")
+            .arg(scene)
+            .arg("--out")
+            .arg(out)
+            .args(arguments)
+            .arg("--quiet")
+            .env("RAYON_NUM_THREADS", "1"),
+    )
+}
+
+/// Scenes that together have all parts of a linearised step, all solvers and preconditioners: name, steps, and overrides.
+const SCENES: [(&str, &str, &[&str]); 12] = [
+    // LME, dynamics
+    ("rebound.json", "12", &[]),
+    // cubic functions, multigrid with its filter, nodes that follow
+    ("block_static.json", "1", &[]),
+    ("cook.json", "1", &["--set", "aggregation=true"]),
+    // von Mises: unsymmetric or general tangents
+    ("cook_plastic.json", "2", &[]),
+    ("compaction.json", "3", &[]),
+    // friction and obstacles
+    ("rolling.json", "4", &[]),
+    ("billiard.json", "4", &[]),
+    ("collision.json", "4", &[]),
+    // a free obstacle
+    ("wedge.json", "4", &[]),
+    // the arc length
+    ("elastica.json", "2", &[]),
+    // three dimensions
+    ("ball_drop.json", "2", &[]),
+    ("riemann.json", "3", &[]),
+];
+
+#[test]
+fn runs_on_a_gpu_have_the_bits_of_those_on_the_processor() -> Result<(), Failure> {
+    for (scene, steps, sets) in SCENES {
+        let directory = tempfile::tempdir()?;
+        let [here, there] = ["here", "there"].map(|name| directory.path().join(name));
+        let arguments = [&["--steps", steps], sets].concat();
+        let on_processor = run(&mut Command::new(bfree()), scene, &here, &arguments)?;
+        assert_eq!(on_processor.0, Some(0), "{scene}: {}", on_processor.2);
+        for order in ["forward", "scrambled"] {
+            let log = directory.path().join(order);
+            let arguments = [&arguments[..], &["--gpu", "--discard"]].concat();
+            let on_gpu = run(emulated(bfree(), order).env("BFREE_GPU_LOG", &log), scene, &there, &arguments)?;
+            assert_eq!(on_gpu.0, Some(0), "{scene}: {}", on_gpu.2);
+            for name in ["history.csv", "particles_0000.vtu", "particles_0001.vtu", "contacts.csv"] {
+                let [here, there] = [&here, &there].map(|folder| std::fs::read(folder.join(name)).ok());
+                assert!(here == there, "{scene}, {order}: {name} differs");
+            }
+            assert!(std::fs::read_to_string(&log)?.contains("product_"), "{scene}: the product ran elsewhere");
+        }
+    }
+    Ok(())
+}
+
+/// A block of a random kind: functions, law, mass, damping, averaged cells, followers, pressure, walls.
+fn random_block(dimension: usize, case: usize) -> Value {
+    let families = [
+        json!("linear"),
+        json!("gimp"),
+        json!({"bspline": {"degree": 2}}),
+        json!({"bspline": {"degree": 3}}),
+        json!({"lme": {"gamma": 3}}),
+        json!({"lme": {"gamma": 0.8}}),
+    ];
+    let materials = [
+        json!({"neo_hookean": {"young": 100, "poisson": 0.3}}),
+        json!({"mooney_rivlin": {"c1": 20, "c2": 5, "bulk": 200}}),
+        json!({"ogden": {"terms": [{"modulus": 20, "exponent": 2}, {"modulus": -5, "exponent": -2}], "bulk": 200}}),
+    ];
+    let of = |x: f64| vec![x; dimension];
+    let is_dynamic = case % 5 != 4;
+    let body = json!({"name": "block", "density": 2, "shape": {"box": {"min": of(0.5), "max": of(2.25)}},
+        "material": materials[case % 3], "volumetric": if case % 4 == 1 { "mean_dilatation" } else { "pointwise" }});
+    let mut scene = json!({"grid": {"size": of(4.0), "spacing": 0.5}, "time": {"step": 0.01, "end": 1},
+        "approximation": families[case % 6], "aggregation": case % 7 > 3, "bodies": [body], "boundary": {"left": "fixed", "right": "sliding"}});
+    if is_dynamic {
+        scene["time"]["lumping"] = json!([1.0, 0.4, 0.0][case / 2 % 3]);
+        scene["damping"] = json!({"mass": 0.1, "stiffness": if case % 2 == 0 { 0.01 } else { 0.0 }});
+    } else {
+        scene["time"]["scheme"] = json!("none");
+    }
+    if has_pressure(case) {
+        scene["pressures"] = json!([{"body": "block", "pressure": 3}]);
+    }
+    scene
+}
+
+/// Pressures are summed over the nodes in another order.
+const fn has_pressure(case: usize) -> bool {
+    case % 11 == 10
+}
+
+/// Compares the products of the next step of a scene. Particles are moved at random by up to most of a cell, so that cells hold none to many.
+fn compare_products<const D: usize>(gpu: &Arc<Gpu>, case: usize) -> Result<(), Failure> {
+    let scene = random_block(D, case);
+    let mut simulation = crate::support::built::<D>(&scene)?;
+    simulation.settings.gpu = Some(gpu.clone());
+    let particles = &mut simulation.particles;
+    let spread = 0.45 * (1 + case % 2) as f64 * simulation.grid.spacing;
+    let moves = direction::<D>(particles.len(), case as u64);
+    particles.position.iter_mut().zip(&moves).for_each(|(x, by)| *x += by * spread);
+    for (k, h) in particles.displacement_gradient.iter_mut().enumerate() {
+        h.iter_mut().enumerate().for_each(|(i, h)| *h = 0.1 * moves[(k + i) % moves.len()][0]);
+    }
+    let coming = simulation.next_step()?;
+    let (equilibrium, count) = (coming.equilibrium(), coming.nodes().len());
+    let phi: Vec<_> = direction::<D>(count, 1).iter().map(|x| x * 0.01).collect();
+    let mut u = direction::<D>(count, 2);
+    coming.prescribed().iter().for_each(|dof| u[dof.node][dof.component] = 0.0);
+    let tangent = equilibrium.tangent(&phi)?;
+    let mut expected = vec![Vector::zeros(); count];
+    tangent.product(&u, &mut expected);
+    let on_device = tangent.on_device().ok_or("no device")?;
+    let (x, mut y) = (gpu.vector(&u.iter().flatten().copied().collect::<Vec<_>>()), gpu.zeros(D * count));
+    on_device.apply(&x, &mut y);
+    gpu.check()?;
+    let found = gpu.numbers(&y);
+    let largest = expected.iter().map(|f| f.amax()).fold(0.0, f64::max);
+    let apart = expected.iter().flatten().zip(&found).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    let bound = if has_pressure(case) { 1e-14 * largest } else { 0.0 };
+    assert!(largest > 0.0 && apart <= bound, "{D}D, case {case}: {apart:e} of {largest:e}: {scene}");
+    Ok(())
+}
+
+/// Products on a processor that rounds a product and a sum once have the bits of those on a device.
+#[test]
+fn products_have_the_bits_of_the_processor() -> Result<(), Failure> {
+    if !is_emulated("products_have_the_bits_of_the_processor") {
+        return Ok(());
+    }
+    let gpu = Arc::new(Gpu::open()?);
+    for case in 0..42 {
+        compare_products::<1>(&gpu, case)?;
+        compare_products::<2>(&gpu, case)?;
+        compare_products::<3>(&gpu, case)?;
+    }
+    Ok(())
+}
+
+#[test]
+fn vectors_have_the_bits_of_the_processor() -> Result<(), Failure> {
+    if !is_emulated("vectors_have_the_bits_of_the_processor") {
+        return Ok(());
+    }
+    let (gpu, pool) = (Gpu::open()?, bfree::pooled::Pool::default());
+    for n in [1, 7, 127, 128, 129, 2047, 2048, 2049, 5000, 40_000] {
+        let numbers = |seed| direction::<1>(n, seed).iter().map(|x| x[0]).collect::<Vec<f64>>();
+        let (a, b) = (numbers(1), numbers(2));
+        let (x, mut y) = (gpu.vector(&a), gpu.vector(&b));
+        assert_eq!(gpu.dot(&x, &y).to_bits(), pool.dot(&a, &b).to_bits(), "{n}");
+        let mut here = b.clone();
+        pool.axpby(0.3, &a, -0.7, &mut here);
+        gpu.axpby(0.3, &x, -0.7, &mut y);
+        pool.divided(&here.clone(), 3.0, &mut here);
+        gpu.divided(&gpu.copied(&y), 3.0, &mut y);
+        assert_eq!(gpu.numbers(&y), here, "{n}");
+        // Squares that underflow and overflow.
+        for scale in [1e-200, 1e200] {
+            let scaled: Vec<f64> = a.iter().map(|x| x * scale).collect();
+            assert_eq!(gpu.norm(&gpu.vector(&scaled)).to_bits(), pool.norm(&scaled).to_bits(), "{n}");
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn a_gpu_that_is_missing_is_told_in_one_sentence() -> Result<(), Failure> {
+    if Gpu::open().is_ok() {
+        println!("skipped: there is a GPU");
+        return Ok(());
+    }
+    let directory = tempfile::tempdir()?;
+    let said = run(&mut Command::new(bfree()), "rebound.json", directory.path(), &["--gpu", "--steps", "1"])?;
+    assert_eq!(said.0, Some(2), "{}", said.2);
+    assert!(said.2.contains("no NVIDIA driver") && said.2.lines().count() == 1, "{}", said.2);
+    Ok(())
+}
+
+#[test]
+fn a_gpu_that_fails_loses_nothing() -> Result<(), Failure> {
+    let directory = tempfile::tempdir()?;
+    let [whole, broken] = ["whole", "broken"].map(|name| directory.path().join(name));
+    let steps = ["--steps", "12", "--set", "output.checkpoint=0.1"];
+    assert_eq!(run(&mut Command::new(bfree()), "rebound.json", &whole, &steps)?.0, Some(0));
+    // A launch fails in the sixth step or so; and the memory is too small.
+    for (variable, value, words) in
+        [("BFREE_GPU_FAIL", "4000", "CUDA_ERROR_LAUNCH_FAILED"), ("BFREE_GPU_MEMORY", "20000", "has no room for")]
+    {
+        let arguments = [&steps[..], &["--gpu", "--discard"]].concat();
+        let said = run(emulated(bfree(), "forward").env(variable, value), "rebound.json", &broken, &arguments)?;
+        assert_eq!(said.0, Some(1), "{}", said.2);
+        assert!(said.2.contains(words) && !said.2.contains("panicked"), "{}", said.2);
+    }
+    let said = run(&mut Command::new(bfree()), "rebound.json", &broken, &[&steps[..], &["--restart"]].concat())?;
+    assert_eq!(said.0, Some(0), "{}", said.2);
+    assert_eq!(std::fs::read(whole.join("history.csv"))?, std::fs::read(broken.join("history.csv"))?);
+    Ok(())
+}
+
+/// The check of the tangent uses the product that runs.
+#[test]
+fn the_tangent_check_sees_the_product_of_the_gpu() -> Result<(), Failure> {
+    let directory = tempfile::tempdir()?;
+    let arguments = ["--steps", "2", "--gpu", "--check-tangent"];
+    let said = run(&mut emulated(bfree(), "forward"), "rebound.json", &directory.path().join("right"), &arguments)?;
+    assert_eq!(said.0, Some(0), "{}", said.2);
+    Ok(())
+}
