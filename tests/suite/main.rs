@@ -4,6 +4,7 @@ mod accuracy;
 mod adaptive;
 mod aggregation;
 mod approximation;
+mod benchmarks;
 mod between;
 mod carried;
 mod clouds;
