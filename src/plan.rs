@@ -2,9 +2,10 @@
 
 mod arrays;
 
-pub use arrays::ArrayUse;
+pub use arrays::{ArrayUse, DeviceUse};
 
 use crate::approximation::ShapeFunction;
+use crate::gpu::{Gpu, GpuError};
 use crate::material::Law;
 use crate::mechanics::dilatation::Cells;
 use crate::mechanics::loads::PrescribedDof;
@@ -16,7 +17,7 @@ use crate::particles::Body;
 use crate::simulation::{SharedNodes, Simulation};
 use crate::solver::{Krylov, Preconditioning};
 use crate::tensor::Vector;
-use arrays::{arrays, device_bytes};
+use arrays::{arrays, device_use};
 use indicatif::BinaryBytes;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -145,8 +146,8 @@ pub struct Plan {
     pub terms: Vec<TermUse>,
     /// The large arrays.
     pub arrays: Vec<ArrayUse>,
-    /// Bytes on a GPU, if the linear systems are solved there.
-    pub on_gpu: u64,
+    /// Memory on a GPU, if the linear systems are solved there.
+    pub on_gpu: DeviceUse,
     /// The points and the area assumed for each loaded surface.
     pub surfaces: Vec<SurfaceUse>,
     /// Bodies that share nodes at the start, in words.
@@ -177,10 +178,22 @@ impl Plan {
             preconditioner: simulation.preconditioner(),
             terms: terms(simulation, &supports, cells),
             arrays: arrays(simulation, &supports, cells),
-            on_gpu: device_bytes(simulation, &supports) as u64,
+            on_gpu: device_use(simulation, &supports),
             surfaces: SurfaceUse::of(simulation),
             shared_nodes: shared_nodes(simulation, &supports),
         })
+    }
+
+    /// Whether the linear systems fit on a device. Returns the free bytes of its memory.
+    ///
+    /// # Errors
+    /// They do not fit.
+    pub(crate) fn check_fits_on(&self, gpu: &Gpu) -> Result<u64, GpuError> {
+        let DeviceUse { bytes, shared } = self.on_gpu;
+        gpu.check_shared(shared as usize)?;
+        let (free, total) = gpu.memory().ok_or_else(|| GpuError::NoDevice("its memory is unknown".to_owned()))?;
+        let (bytes, fits) = (bytes as usize, bytes <= free as u64);
+        if fits { Ok(free as u64) } else { Err(GpuError::Memory { bytes, free, total }) }
     }
 
     /// Bytes of all arrays together. A step reuses the arrays of the step before.

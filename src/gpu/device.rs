@@ -6,7 +6,7 @@ use bytemuck::Pod;
 use cudarc::driver::sys::{self, CUfunction_attribute};
 use cudarc::driver::{
     CudaContext, CudaFunction, CudaModule, CudaSlice, CudaStream, DevicePtr, DeviceRepr, DriverError, LaunchConfig,
-    PushKernelArg,
+    PushKernelArg, result,
 };
 use cudarc::nvrtc::Ptx;
 use rustc_hash::FxHashMap;
@@ -26,6 +26,9 @@ pub(crate) const THREADS: usize = 128;
 /// Bytes of shared memory that a thread block has without asking.
 const SHARED: usize = 48 << 10;
 
+/// The least version of the driver: CUDA 12.0.
+const LEAST_DRIVER: i32 = 12_000;
+
 /// The least compute capability, major version.
 const LEAST_CAPABILITY: i32 = 8;
 
@@ -38,6 +41,30 @@ pub enum GpuError {
     /// There is a driver, but no device.
     #[error("--gpu: the NVIDIA driver finds no device ({0})")]
     NoDevice(String),
+    /// The driver is too old.
+    #[error("--gpu: the NVIDIA driver is for CUDA {major}.{minor}; at least 12.0 is needed (driver 525)")]
+    OldDriver {
+        /// The version of CUDA that the driver knows.
+        major: i32,
+        /// The version of CUDA that the driver knows.
+        minor: i32,
+    },
+    /// The device does not take the kernels.
+    #[error("--gpu: the driver cannot load the kernels ({0}); run without --gpu")]
+    NoKernels(String),
+    /// A block of cells has more nodes than fit into the memory that its threads share.
+    #[error(
+        "--gpu: a block of cells needs {needed} bytes of shared memory, and {name} has {most}; take narrower shape functions \
+         (a larger gamma), or run without --gpu"
+    )]
+    Shared {
+        /// The device.
+        name: String,
+        /// Bytes needed.
+        needed: usize,
+        /// Bytes that the device has.
+        most: usize,
+    },
     /// The device is too old.
     #[error("--gpu: {name} has compute capability {major}.{minor}; at least {LEAST_CAPABILITY}.0 is needed")]
     TooOld {
@@ -68,6 +95,14 @@ pub enum GpuError {
         /// Bytes of the device.
         total: usize,
     },
+    /// A vector is shorter than the operator is large.
+    #[error("a vector on the GPU has {found} numbers, and the operator needs {needed}")]
+    Length {
+        /// Numbers needed.
+        needed: usize,
+        /// Numbers of the shorter vector.
+        found: usize,
+    },
     /// A call of the driver failed.
     #[error("the GPU failed in {call}: {error}; the state before this step is kept, continue it with --restart")]
     Driver {
@@ -78,9 +113,6 @@ pub enum GpuError {
     },
 }
 
-/// Memory that is not in use. All launches and copies are in one order, so memory is used again at once.
-type Free = Arc<Mutex<Vec<CudaSlice<u8>>>>;
-
 /// A device. The first failure is kept, and nothing is done after it: [`Self::check`] returns it.
 pub struct Gpu {
     stream: Arc<CudaStream>,
@@ -88,10 +120,12 @@ pub struct Gpu {
     /// The kernels that were used so far, with the shared memory that each may have.
     functions: Mutex<FxHashMap<&'static str, (CudaFunction, usize)>>,
     failure: Mutex<Option<GpuError>>,
-    /// Memory for partial sums.
-    partial: Mutex<Option<Buffer<f64>>>,
-    /// Memory that is not in use. The driver would give it back to the system whenever the processor waits for a sum.
-    free: Free,
+    /// Memory for partial sums, on both sides.
+    partial: Mutex<(Option<Buffer<f64>>, Vec<f64>)>,
+    /// Held while several launches share memory.
+    in_use: Mutex<()>,
+    /// Bytes of shared memory that a thread block may have.
+    most_shared: usize,
     name: String,
 }
 
@@ -101,13 +135,23 @@ impl Debug for Gpu {
     }
 }
 
+/// Lets the driver keep freed memory for later allocations. Otherwise it gives it back whenever the processor waits for a sum.
+fn keep_memory(context: &CudaContext) -> Result<(), DriverError> {
+    if !context.has_async_alloc() {
+        return Ok(());
+    }
+    let mut all = u64::MAX;
+    // SAFETY: the device is that of a context, its pool lives as long as the device, and the attribute is a number of 64 bits.
+    unsafe {
+        let pool = result::device::get_default_mem_pool(context.cu_device())?;
+        let attribute = sys::CUmemPool_attribute::CU_MEMPOOL_ATTR_RELEASE_THRESHOLD;
+        result::mem_pool::set_attribute(pool, attribute, (&raw mut all).cast())
+    }
+}
+
 /// The contents of a mutex. No code that holds one panics.
 fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-fn is_out_of_memory(memory: &Result<CudaSlice<u8>, DriverError>) -> bool {
-    memory.as_ref().is_err_and(|error| error.0 == sys::CUresult::CUDA_ERROR_OUT_OF_MEMORY)
 }
 
 fn name_of(error: DriverError) -> String {
@@ -119,11 +163,17 @@ impl Gpu {
     /// The first device of this machine, with the kernels loaded.
     ///
     /// # Errors
-    /// There is no driver or no device, or the device is too old.
+    /// There is no driver or no device, or one of them is too old.
     pub fn open() -> Result<Self, GpuError> {
         // SAFETY: the driver's library is looked for by its name; nothing in it is called.
         if !unsafe { sys::is_culib_present() } {
             return Err(GpuError::NoDriver);
+        }
+        let mut version = 0;
+        // SAFETY: the driver writes its version.
+        _ = unsafe { sys::cuDriverGetVersion(&raw mut version) };
+        if version < LEAST_DRIVER {
+            return Err(GpuError::OldDriver { major: version / 1000, minor: version % 1000 / 10 });
         }
         let missing = |error| GpuError::NoDevice(name_of(error));
         let context = CudaContext::new(0).map_err(missing)?;
@@ -134,11 +184,14 @@ impl Gpu {
         if major < LEAST_CAPABILITY {
             return Err(GpuError::TooOld { name, major, minor });
         }
-        let failed = |error| GpuError::Driver { call: "loading the kernels".to_owned(), error: name_of(error) };
+        keep_memory(&context).map_err(missing)?;
+        let attribute = sys::CUdevice_attribute::CU_DEVICE_ATTRIBUTE_MAX_SHARED_MEMORY_PER_BLOCK_OPTIN;
+        let most_shared = context.attribute(attribute).map_err(missing)?.max(0) as usize;
+        let failed = |error| GpuError::NoKernels(name_of(error));
         let module = context.load_module(Ptx::from_src(KERNELS)).map_err(failed)?;
-        let stream = context.default_stream();
-        let (functions, failure, partial) = (Mutex::default(), Mutex::default(), Mutex::default());
-        Ok(Self { stream, module, functions, failure, partial, free: Free::default(), name })
+        let (functions, failure, partial, in_use) =
+            (Mutex::default(), Mutex::default(), Mutex::default(), Mutex::default());
+        Ok(Self { stream: context.default_stream(), module, functions, failure, partial, in_use, most_shared, name })
     }
 
     /// The name of the device.
@@ -146,17 +199,33 @@ impl Gpu {
         &self.name
     }
 
-    /// Free and all bytes of the device's memory.
-    pub(crate) fn memory(&self) -> (usize, usize) {
-        self.stream.context().mem_get_info().unwrap_or((0, 0))
+    /// Free and all bytes of the device's memory; `None` if the driver does not tell.
+    pub(crate) fn memory(&self) -> Option<(usize, usize)> {
+        self.stream.context().mem_get_info().ok()
     }
 
-    /// The first failure since the last call.
+    /// Whether thread blocks may have so much shared memory.
+    ///
+    /// # Errors
+    /// The device has less.
+    pub(crate) fn check_shared(&self, needed: usize) -> Result<(), GpuError> {
+        let (name, most) = (self.name.clone(), self.most_shared);
+        if needed <= most { Ok(()) } else { Err(GpuError::Shared { name, needed, most }) }
+    }
+
+    /// The first failure. After it, nothing is done on this device any more.
     ///
     /// # Errors
     /// A call of the driver failed. Vectors and results since then mean nothing.
     pub fn check(&self) -> Result<(), GpuError> {
         locked(&self.failure).clone().map_or(Ok(()), Err)
+    }
+
+    /// Keeps the failure, if it is the first one.
+    pub(super) fn keep_failure(&self, result: Result<(), GpuError>) {
+        if let Err(failure) = result {
+            locked(&self.failure).get_or_insert(failure);
+        }
     }
 
     fn has_failed(&self) -> bool {
@@ -178,26 +247,14 @@ impl Gpu {
     pub(crate) fn memory_for<T: Pod>(&self, len: usize) -> Buffer<T> {
         let bytes = (len * size_of::<T>()).max(1);
         let memory = if self.has_failed() { None } else { self.allocate(bytes) };
-        Buffer { memory, len, free: self.free.clone(), of: PhantomData }
+        Buffer { memory, len, of: PhantomData }
     }
 
     fn allocate(&self, bytes: usize) -> Option<CudaSlice<u8>> {
-        let mut free = locked(&self.free);
-        // No more than an eighth of it stays without use.
-        let fitting = (0..free.len()).filter(|&at| (bytes..=bytes + bytes / 8).contains(&free[at].len()));
-        if let Some(at) = fitting.min_by_key(|&at| free[at].len()) {
-            return Some(free.swap_remove(at));
-        }
         // SAFETY: any bytes are numbers of the plain types that buffers hold, and whoever takes a buffer writes it first.
-        let mut memory = unsafe { self.stream.alloc::<u8>(bytes) };
-        if is_out_of_memory(&memory) && !free.is_empty() {
-            free.clear();
-            _ = self.keep("synchronisation", self.stream.synchronize());
-            // SAFETY: as above.
-            memory = unsafe { self.stream.alloc::<u8>(bytes) };
-        }
-        if is_out_of_memory(&memory) {
-            let (free, total) = self.memory();
+        let memory = unsafe { self.stream.alloc::<u8>(bytes) };
+        if memory.as_ref().is_err_and(|error| error.0 == sys::CUresult::CUDA_ERROR_OUT_OF_MEMORY) {
+            let (free, total) = self.memory().unwrap_or_default();
             locked(&self.failure).get_or_insert(GpuError::Memory { bytes, free, total });
         }
         self.keep("an allocation", memory)
@@ -216,7 +273,9 @@ impl Gpu {
             let bytes: &[u8] = bytemuck::cast_slice(numbers);
             let from = size_of::<T>() * at;
             let mut part = memory.slice_mut(from..from + bytes.len());
-            _ = self.keep("a copy to the device", self.stream.memcpy_htod(bytes, &mut part));
+            let copied = self.stream.memcpy_htod(bytes, &mut part);
+            // The numbers may go away before the copy is made.
+            _ = self.keep("a copy to the device", copied.and_then(|()| self.stream.synchronize()));
         }
     }
 
@@ -230,18 +289,24 @@ impl Gpu {
         _ = self.keep("a copy from the device", copied.and_then(|()| self.stream.synchronize()));
     }
 
-    /// Calls `fill` with memory for `count` partial sums and their sum, adds them, and returns the sum; NaN after a failure.
+    /// Calls `fill` with memory for `count` partial sums, and adds them in their order; NaN after a failure.
     pub(super) fn sum(&self, count: usize, fill: impl FnOnce(u64)) -> f64 {
-        let mut partial = locked(&self.partial);
-        if partial.as_ref().is_none_or(|partial| partial.len() <= count) {
-            *partial = Some(self.memory_for(2 * count + 1));
+        let (on_device, numbers) = &mut *locked(&self.partial);
+        if on_device.as_ref().is_none_or(|partial| partial.len() < count) {
+            *on_device = Some(self.memory_for(count));
         }
-        let Some(partial) = partial.as_ref().filter(|_| count > 0) else { return 0.0 };
-        fill(partial.address());
-        self.launch("add_partial", 1, SHARED_SUM, &Sum { partial: partial.address(), count: count as i64 });
-        let mut sum = [f64::NAN];
-        self.read_at(partial, count, &mut sum);
-        sum[0]
+        numbers.clear();
+        numbers.resize(count, f64::NAN);
+        if let Some(partial) = on_device {
+            fill(partial.address());
+            self.read_at(partial, 0, numbers);
+        }
+        numbers.iter().sum()
+    }
+
+    /// Excludes other threads of the program while several launches share memory.
+    pub(super) fn lock(&self) -> MutexGuard<'_, ()> {
+        locked(&self.in_use)
     }
 
     /// Sets all bytes of a buffer to zero.
@@ -262,8 +327,8 @@ impl Gpu {
     }
 
     /// Launches `blocks` thread blocks of a kernel, each with `shared` bytes of shared memory. The callers, which are the files of this room,
-    /// take all addresses in the arguments from buffers, with room for what the kernel writes. Memory that is given back is used again by
-    /// later launches only.
+    /// take all addresses in the arguments from buffers, with room for what the kernel writes. The driver frees a buffer after the launches
+    /// before.
     pub(super) fn launch<T: Copy>(&self, kernel: &'static str, blocks: usize, shared: usize, arguments: &T) {
         if blocks == 0 || self.has_failed() {
             return;
@@ -286,6 +351,7 @@ impl Gpu {
     /// A kernel that may have so much shared memory.
     fn function(&self, kernel: &'static str, shared: usize) -> Option<CudaFunction> {
         let mut functions = locked(&self.functions);
+        self.keep(kernel, self.stream.context().bind_to_thread())?;
         if !functions.contains_key(kernel) {
             functions.insert(kernel, (self.keep(kernel, self.module.load_function(kernel))?, SHARED));
         }
@@ -306,27 +372,22 @@ struct Argument<T>(T);
 // SAFETY: plain data, with the layout of the struct in the kernel's source.
 unsafe impl<T: Copy> DeviceRepr for Argument<T> {}
 
-/// `Sum` of `kernels/vectors.h`.
-#[derive(Clone, Copy)]
-#[repr(C)]
-struct Sum {
-    partial: u64,
-    count: i64,
-}
-
 /// Numbers in the device's memory.
 #[derive(Debug)]
 pub(crate) struct Buffer<T> {
     /// `None` if the device had failed before.
     memory: Option<CudaSlice<u8>>,
     len: usize,
-    free: Free,
     of: PhantomData<T>,
 }
 
 impl<T> Drop for Buffer<T> {
     fn drop(&mut self) {
-        locked(&self.free).extend(self.memory.take());
+        if let Some(memory) = &self.memory {
+            // The driver frees memory for the thread that is bound to the device.
+            let context = memory.stream().context();
+            context.record_err(context.bind_to_thread());
+        }
     }
 }
 

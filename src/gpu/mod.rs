@@ -19,5 +19,5 @@ pub(crate) use device::Buffer;
 pub use device::{Gpu, GpuError};
 pub(crate) use multigrid::{Filter, Level, LevelArrays};
 pub(crate) use points::{NO_OBSTACLE, PointArrays, Points};
-pub(crate) use product::{Cells, Followers, Masses, Product, Rows, Transfer, TransferArrays};
+pub(crate) use product::{Cells, Followers, Inertia, Masses, Product, Rows, SETS, Transfer, TransferArrays};
 pub use vectors::GpuVector;

@@ -138,7 +138,7 @@ impl Level {
         gpu.multiply_blocks(&self.inverse, self.dimension, r, z);
     }
 
-    fn interpolate(&self, gpu: &Gpu, kernel: &'static str, held: u64, x: &GpuVector, y: &GpuVector) {
+    fn interpolate(&self, gpu: &Gpu, kernel: &'static str, held: u64, x: &GpuVector, y: &mut GpuVector) {
         let n = y.0.len();
         let arguments = InterpolationArguments {
             lists: self.lists.each_ref().map(Buffer::address),
@@ -154,8 +154,8 @@ impl Level {
 
     /// Eᵀ Pᵀ r
     pub(crate) fn restrict(&self, gpu: &Gpu, r: &GpuVector) -> Box<GpuVector> {
-        let mut out = gpu.zeros(self.held.len());
-        self.interpolate(gpu, "restrict_to_coarse", self.held_at_once(), r, &out);
+        let mut out = gpu.unspecified(self.held.len());
+        self.interpolate(gpu, "restrict_to_coarse", self.held_at_once(), r, &mut out);
         self.restrict_followers(gpu, &mut out);
         out
     }
@@ -222,6 +222,7 @@ impl Filter {
 
     /// z += D^{−½} Q Qᵀ D^{−½} r
     pub(crate) fn add(&self, gpu: &Gpu, r: &GpuVector, z: &mut GpuVector) {
+        let _lock = gpu.lock();
         let [x, residual, p] = self.memory.each_ref().map(Buffer::address);
         let n = self.scale.len();
         let whole = FilterArguments {

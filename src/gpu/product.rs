@@ -1,13 +1,19 @@
 //! The product of a linearised step with a nodal field, on a device (`kernels/data.h` and `kernels/transfer.h`).
 
-use super::device::{Buffer, Gpu, THREADS};
+use super::device::{Buffer, Gpu, GpuError, THREADS};
 use super::points::{PointSums, Points};
 use super::vectors::GpuVector;
 use crate::lanes::LANES;
 use std::sync::{Arc, Mutex, PoisonError};
 
+/// Weights that are copied at a time.
+const PART: usize = 4 << 20;
+
 /// Most sets of rows of a product.
-const SETS: usize = 4;
+pub(crate) const SETS: usize = 4;
+
+/// Bytes of shared memory for the rows of groups that are summed at a time. Four thread blocks then fit on a multiprocessor.
+const STAGED: usize = 12 << 10;
 
 /// Bytes of `Window` of `kernels/data.h`.
 const WINDOW: usize = 64;
@@ -60,11 +66,37 @@ impl TransferArrays {
         numbers * size_of::<u32>() + places * self.dimension * size_of::<f64>()
     }
 
-    /// Bytes of shared memory of a thread block: two boxes, the numbers of its particles, and the windows of its groups.
-    fn shared(&self) -> usize {
+    /// Bytes of shared memory of a thread block: two boxes, the numbers of its particles, the windows of its groups, and the rows of the groups
+    /// that are summed at a time.
+    pub(crate) fn shared(&self) -> usize {
         let largest = self.box_first.windows(2).map(|bounds| bounds[1] - bounds[0]).max().unwrap_or(0) as usize;
         let numbers = self.dimension * (1 + self.dimension);
-        size_of::<f64>() * (2 * self.dimension * largest + numbers * THREADS) + THREADS / LANES * WINDOW
+        let staged = self.dimension * self.largest_window().together(self.dimension) * self.largest_window().nodes;
+        size_of::<f64>() * (2 * self.dimension * largest + numbers * THREADS + staged) + THREADS / LANES * WINDOW
+    }
+
+    /// The most rows along x and nodes of a window.
+    fn largest_window(&self) -> LargestWindow {
+        let mut largest = LargestWindow { rows: 1, nodes: 1 };
+        for [x, y, z, _] in self.window_shape.iter().map(|shape| shape.to_le_bytes()) {
+            let rows = usize::from(y) * usize::from(z);
+            largest = LargestWindow { rows: largest.rows.max(rows), nodes: largest.nodes.max(usize::from(x) * rows) };
+        }
+        largest
+    }
+}
+
+/// The most rows along x and nodes of a window.
+#[derive(Clone, Copy, Debug)]
+struct LargestWindow {
+    rows: usize,
+    nodes: usize,
+}
+
+impl LargestWindow {
+    /// Groups of particles whose rows are summed at a time.
+    fn together(self, dimension: usize) -> usize {
+        (STAGED / (self.nodes * dimension * size_of::<f64>())).clamp(1, THREADS / LANES)
     }
 }
 
@@ -76,6 +108,7 @@ pub(crate) struct Transfer {
     blocks: usize,
     nodal: usize,
     shared: usize,
+    window: LargestWindow,
     /// The arrays of [`TransferArrays`], then the entries of the nodes.
     arrays: [Buffer<u32>; 11],
     weights: Buffer<f64>,
@@ -98,12 +131,18 @@ impl Transfer {
         arrays: &TransferArrays,
         weights: impl Iterator<Item = &'a [[f64; LANES]]> + Clone,
     ) -> Self {
+        gpu.keep_failure(gpu.check_shared(arrays.shared()));
         let rows = weights.clone().map(<[_]>::len).sum::<usize>();
-        let (mut on_device, mut at) = (gpu.memory_for(rows * LANES), 0);
+        let (mut on_device, mut at, mut part) = (gpu.memory_for(rows * LANES), 0, Vec::with_capacity(PART));
         for rows in weights {
-            gpu.write_at(rows.as_flattened(), &mut on_device, at);
-            at += rows.as_flattened().len();
+            if part.len() + rows.len() * LANES > PART {
+                gpu.write_at(&part, &mut on_device, at);
+                at += part.len();
+                part.clear();
+            }
+            part.extend_from_slice(rows.as_flattened());
         }
+        gpu.write_at(&part, &mut on_device, at);
         let places = arrays.box_first.last().copied().unwrap_or(0) as usize;
         let [entry_first, entries] = arrays.entries();
         let a = arrays;
@@ -125,6 +164,7 @@ impl Transfer {
             blocks: a.group_first.len().saturating_sub(1),
             nodal: a.nodal,
             shared: a.shared(),
+            window: a.largest_window(),
             arrays: lists.map(|list| gpu.copy_of(list)),
             weights: on_device,
             boxes: gpu.memory_for(places * a.dimension),
@@ -249,11 +289,21 @@ struct RowsArguments {
     first_of_a: i32,
 }
 
-/// Masses of nodes, or of particles by group and lane, times a factor.
+/// The masses of all particles by group and lane, and the lumped masses of all nodes, on a device.
 #[derive(Debug)]
 pub(crate) struct Masses {
-    pub masses: Buffer<f64>,
+    pub consistent: Buffer<f64>,
+    pub lumped: Buffer<f64>,
+}
+
+/// α M̃ on a device.
+#[derive(Clone, Debug)]
+pub(crate) struct Inertia {
+    pub masses: Arc<Masses>,
+    /// α
     pub factor: f64,
+    /// ε
+    pub lumping: f64,
 }
 
 /// `Product` of `kernels/data.h`.
@@ -265,7 +315,11 @@ struct ProductArguments {
     boxes: u64,
     mass: u64,
     mass_factor: f64,
+    consistent: f64,
     sets: i32,
+    together: i32,
+    window_rows: i32,
+    window_nodes: i32,
     rows: [RowsArguments; SETS],
 }
 
@@ -403,10 +457,7 @@ pub(crate) fn clear_fixed(gpu: &Gpu, fixed: &Buffer<u8>, field: &mut GpuVector) 
 #[derive(Debug)]
 pub(crate) struct Product {
     pub transfer: Arc<Transfer>,
-    /// Consistent masses of the particles.
-    pub masses: Option<Masses>,
-    /// Lumped masses of the nodes.
-    pub lumped: Option<Masses>,
+    pub inertia: Option<Inertia>,
     pub rows: Vec<Rows>,
     /// Follower pressures, and contact.
     pub points: [Option<Points>; 2],
@@ -421,6 +472,13 @@ impl Product {
     /// `y = K x`
     pub(crate) fn apply(&self, x: &GpuVector, y: &mut GpuVector) {
         let gpu = self.transfer.gpu();
+        let _lock = gpu.lock();
+        if x.0.len().min(y.0.len()) < self.prescribed.len() {
+            return gpu.keep_failure(Err(GpuError::Length {
+                needed: self.prescribed.len(),
+                found: x.0.len().min(y.0.len()),
+            }));
+        }
         let Some(followers) = &self.followers else { return self.apply_to_all(x, self.prescribed.address(), y) };
         let mut extended = self.extended.lock().unwrap_or_else(PoisonError::into_inner);
         gpu.copy(&x.0, &mut extended.0);
@@ -433,27 +491,29 @@ impl Product {
     /// The product at all nodes, except those whose address is given as prescribed.
     fn apply_to_all(&self, u: &GpuVector, prescribed: u64, y: &mut GpuVector) {
         let (gpu, transfer) = (self.transfer.gpu(), &*self.transfer);
-        let passes = self.masses.is_some() || !self.rows.is_empty();
-        let factor = |masses: &Option<Masses>| masses.as_ref().map_or((0, 0.0), |of| (of.masses.address(), of.factor));
+        let has_mass = self.inertia.as_ref().filter(|of| of.lumping < 1.0);
+        let passes = has_mass.is_some() || !self.rows.is_empty();
         if passes {
             let mut rows = [RowsArguments::default(); SETS];
             for (to, from) in rows.iter_mut().zip(&self.rows) {
                 *to = from.arguments(transfer, u);
             }
-            let (mass, mass_factor) = factor(&self.masses);
             let arguments = ProductArguments {
                 transfer: transfer.arguments(),
                 u: u.address(),
                 boxes: transfer.boxes.address(),
-                mass,
-                mass_factor,
+                mass: has_mass.map_or(0, |of| of.masses.consistent.address()),
+                mass_factor: has_mass.map_or(0.0, |of| of.factor),
+                consistent: has_mass.map_or(0.0, |of| 1.0 - of.lumping),
                 sets: self.rows.len().min(SETS) as i32,
+                together: transfer.window.together(transfer.dimension) as i32,
+                window_rows: transfer.window.rows as i32,
+                window_nodes: transfer.window.nodes as i32,
                 rows,
             };
             let kernel = ["product_1", "product_2", "product_3"][transfer.dimension - 1];
             gpu.launch(kernel, transfer.blocks, transfer.shared, &arguments);
         }
-        let (lumped, lumped_factor) = factor(&self.lumped);
         let [entry_first, entries] = [9, 10].map(|k| transfer.arrays[k].address());
         let n = transfer.nodal * transfer.dimension;
         let none = PointSums::default();
@@ -461,8 +521,8 @@ impl Product {
             entry_first,
             entries,
             boxes: if passes { transfer.boxes.address() } else { 0 },
-            lumped,
-            lumped_factor,
+            lumped: self.inertia.as_ref().map_or(0, |of| of.masses.lumped.address()),
+            lumped_factor: self.inertia.as_ref().map_or(0.0, |of| of.factor * of.lumping),
             u: u.address(),
             prescribed,
             points: self.points.each_ref().map(|points| points.as_ref().map_or(none, |points| points.forces(gpu, u))),

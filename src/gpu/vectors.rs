@@ -62,6 +62,17 @@ struct Advance {
     n: i64,
 }
 
+/// `Move` of `kernels/vectors.h`.
+#[derive(Clone, Copy)]
+#[repr(C)]
+struct Move {
+    p: u64,
+    q: u64,
+    x: u64,
+    r: u64,
+    n: i64,
+}
+
 /// `Blocks` of `kernels/vectors.h`.
 #[derive(Clone, Copy)]
 #[repr(C)]
@@ -76,7 +87,7 @@ struct Blocks {
 impl Gpu {
     /// z = M r for a matrix M of diagonal blocks with `dimension` rows, stored column by column. Where there are no blocks, z = r.
     pub(crate) fn multiply_blocks(&self, blocks: &Buffer<f64>, dimension: usize, r: &GpuVector, z: &mut GpuVector) {
-        let n = blocks.len() / dimension;
+        let n = (blocks.len() / dimension).min(r.0.len()).min(z.0.len());
         if n < r.0.len() {
             Vectors::copy(self, r, z);
         }
@@ -118,7 +129,7 @@ impl Vectors for Gpu {
     }
 
     fn dot(&self, x: &GpuVector, y: &GpuVector) -> f64 {
-        let n = x.0.len();
+        let n = x.0.len().min(y.0.len());
         let count = n.div_ceil(CHUNK);
         self.sum(count, |partial| {
             let arguments = Dot { x: x.address(), y: y.address(), partial, n: n as i64 };
@@ -155,14 +166,15 @@ impl Vectors for Gpu {
     }
 
     fn move_along(&self, p: &GpuVector, q: &GpuVector, x: &mut GpuVector, r: &mut GpuVector) {
-        self.axpy(1.0, p, x);
-        self.axpy(-1.0, q, r);
+        let n = p.0.len().min(q.0.len()).min(x.0.len()).min(r.0.len());
+        let [p, q, x, r] = [p, q, &*x, &*r].map(GpuVector::address);
+        self.launch_for("move_along", n, &Move { p, q, x, r, n: n as i64 });
     }
 
     fn advance(
         &self, α: f64, Along { p, q, x }: Along<'_, GpuVector>, next: &mut GpuVector, r: &mut GpuVector
     ) -> f64 {
-        let n = x.0.len();
+        let n = [p, q, x, &*next, &*r].map(|one| one.0.len()).into_iter().min().unwrap_or(0);
         let count = n.div_ceil(CHUNK);
         self.sum(count, |partial| {
             let [p, q, x, next, r] = [p, q, x, &*next, &*r].map(GpuVector::address);

@@ -1,7 +1,7 @@
 //! The linearised step on a device: its arrays are copied there, and its product runs there.
 
 use super::tangent::Tangent;
-use crate::gpu::{Gpu, GpuVector, Masses, Product, Transfer};
+use crate::gpu::{self, Gpu, GpuVector, Inertia, Product, Transfer};
 use crate::solver::{LinearOperator, OnDevice};
 use crate::space::vector::Vectors;
 use crate::tensor::Vector;
@@ -35,18 +35,19 @@ impl<const D: usize> Tangent<'_, D> {
     /// The tangent on the device of its shape functions, if they have one.
     pub(super) fn device_tangent(&self) -> Option<DeviceTangent> {
         let transfer: Arc<Transfer> = self.supports().on_device()?.clone();
-        let (gpu, mass) = (transfer.gpu().clone(), &self.mass);
-        let has_mass = self.data.mass != 0.0;
-        let consistent = || gpu.copy_of(&self.supports().by_lane(|p| mass.consistent(p)));
-        let masses = (has_mass && mass.lumping < 1.0).then(|| Masses { masses: consistent(), factor: self.data.mass });
-        let lumped =
-            has_mass.then(|| Masses { masses: gpu.copy_of(mass.lumped), factor: self.data.mass * mass.lumping });
+        if self.data.stresses.len() + self.data.cells.len() > gpu::SETS {
+            return None;
+        }
+        let (gpu, mass, factor) = (transfer.gpu().clone(), &self.mass, self.data.mass);
+        let inertia = (factor != 0.0).then(|| {
+            let masses = self.supports().masses_on_device(&gpu, |p| mass.particles.mass[p], mass.lumped);
+            Inertia { masses, factor, lumping: mass.lumping }
+        });
         let prescribed: Vec<u8> = self.space.prescribed_mask().into_iter().map(u8::from).collect();
         let followers = self.space.followers().on_device(&gpu);
         let extended = if followers.is_some() { prescribed.len() } else { 0 };
         Some(DeviceTangent(Product {
-            masses,
-            lumped,
+            inertia,
             rows: self.data.rows_on_device(&gpu, self.supports()),
             points: [
                 self.data.pressures.on_device(&gpu, self.supports()),

@@ -45,11 +45,20 @@ pub(super) fn arrays<const D: usize, L: Law, A: ShapeFunction>(
     used.map(|(_, name, bytes)| ArrayUse { name, bytes: bytes as u64 }).collect()
 }
 
-/// Bytes that a run of a simulation takes on a device.
-pub(super) fn device_bytes<const D: usize, L: Law, A: ShapeFunction>(
+/// Memory that a run takes on a device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DeviceUse {
+    /// Bytes of the device's memory.
+    pub bytes: u64,
+    /// Bytes that the threads of a block share.
+    pub shared: u64,
+}
+
+/// The memory that a run of a simulation takes on a device.
+pub(super) fn device_use<const D: usize, L: Law, A: ShapeFunction>(
     simulation: &Simulation<D, L, A>,
     supports: &Supports<D>,
-) -> usize {
+) -> DeviceUse {
     let (settings, nodes) = (&simulation.settings, supports.active().len());
     let by_lane = supports.groups() * LANES * NUMBER;
     let discrete_gradient = simulation.has_mean_stress();
@@ -70,7 +79,9 @@ pub(super) fn device_bytes<const D: usize, L: Law, A: ShapeFunction>(
     let levels = if multigrid { multigrid_bytes(nodes, D) - nodes * D.pow(4) * NUMBER } else { 0 };
     let followers = supports.extension().map_or(0, |extension| extension.bytes() + nodes * D * NUMBER);
     let nodal = nodes * (NUMBER + D + D * D * NUMBER + D * NUMBER * vectors);
-    supports.device_bytes() + sets * (laws + of_cells) + masses + levels + followers + nodal
+    let [functions, shared] = supports.device_bytes();
+    let bytes = functions + sets * (laws + of_cells) + masses + levels + followers + nodal;
+    DeviceUse { bytes: bytes as u64, shared: shared as u64 }
 }
 
 /// Whether a run has the array, the name of the array, and its bytes.

@@ -119,10 +119,7 @@ impl Run {
 
     fn execute_in<const D: usize>(&self, scene: &Scene, start: Instant) -> Result<(), Failure> {
         let mut simulation = self.scene.build::<D>(scene)?;
-        self.scene.plan(&simulation)?;
-        if self.gpu {
-            simulation.use_gpu().map_err(Failure::scene)?;
-        }
+        self.check_room(&mut simulation)?;
         simulation.settings.check_tangent = self.check_tangent.and_then(NonZeroU64::new);
         let directory = directory::of_results(self.out.as_deref(), &self.scene.scene)?;
         let probes = bound_probes(scene, &simulation);
@@ -178,6 +175,16 @@ impl Run {
             Failure::Run(error)
         })?;
         self.report(steps, failure, &inputs, &warnings, &directory)
+    }
+
+    /// Checks that the arrays of the run have room, and takes the GPU if it is asked for.
+    fn check_room<const D: usize>(&self, simulation: &mut Simulation<D>) -> Result<(), Failure> {
+        let plan = self.scene.plan(simulation)?;
+        if self.gpu {
+            simulation.use_gpu().map_err(Failure::scene)?;
+        }
+        let gpu = simulation.settings.gpu.as_ref();
+        gpu.map_or(Ok(0), |gpu| plan.check_fits_on(gpu)).map(drop).map_err(Failure::scene)
     }
 
     /// The entries of the report that are known before the first step, and the warnings about the scene. Tells them, too.

@@ -2,7 +2,7 @@
 
 use super::failure::{Failure, print, tell};
 use super::probes::{Bound, bound_probes};
-use crate::gpu::{Gpu, GpuError};
+use crate::gpu::GpuError;
 use crate::material::allow_library;
 use crate::memory;
 use crate::particles::Particles;
@@ -116,7 +116,7 @@ impl SceneArguments {
         let plan = self.plan(&simulation)?;
         lines.push(plan.to_string());
         if gpu {
-            lines.push(on_gpu(&simulation, &plan)?);
+            lines.push(on_gpu(simulation.clone(), &plan)?);
         }
         lines.push(format!("output        {}", written(scene)));
         let probes = bound_probes(scene, &simulation);
@@ -132,17 +132,16 @@ impl SceneArguments {
 ///
 /// # Errors
 /// There is no GPU, or the scene does not run there.
-fn on_gpu<const D: usize>(simulation: &Simulation<D>, plan: &Plan) -> Result<String, Failure> {
-    simulation.check_gpu().map_err(Failure::scene)?;
-    let gpu = Gpu::open().map_err(Failure::scene)?;
-    let (free, _) = gpu.memory();
-    let (needed, name) = (BinaryBytes(plan.on_gpu), gpu.name());
-    let line = format!("gpu           {needed} on {name}, where {} are free", BinaryBytes(free as u64));
-    if plan.on_gpu <= free as u64 {
-        Ok(line)
-    } else {
-        Err(Failure::scene(GpuError::Memory { bytes: plan.on_gpu as usize, free, total: gpu.memory().1 }))
-    }
+fn on_gpu<const D: usize>(mut simulation: Simulation<D>, plan: &Plan) -> Result<String, Failure> {
+    simulation.use_gpu().map_err(Failure::scene)?;
+    let gpu = simulation.settings.gpu.ok_or_else(|| Failure::scene(GpuError::NoDriver))?;
+    let free = plan.check_fits_on(&gpu).map_err(Failure::scene)?;
+    Ok(format!(
+        "gpu           {} on {}, where {} are free",
+        BinaryBytes(plan.on_gpu.bytes),
+        gpu.name(),
+        BinaryBytes(free)
+    ))
 }
 
 /// The fields in the snapshots, in words. No other field is computed, except for probes.

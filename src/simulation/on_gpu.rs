@@ -4,6 +4,7 @@ use super::Simulation;
 use crate::approximation::ShapeFunction;
 use crate::gpu::{Gpu, GpuError};
 use crate::material::Law;
+use crate::mechanics::sweep::WIDEST;
 use std::sync::Arc;
 
 impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
@@ -35,8 +36,12 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// The first part that cannot.
     pub(crate) fn check_gpu(&self) -> Result<(), GpuError> {
         let refused = |part, cure| Err(GpuError::NotYet { part, cure });
-        if self.approximation.separable().is_none() {
-            return refused("LME functions on a circle of nodes do", "take \"support\": \"separable\"");
+        match self.approximation.separable() {
+            None => return refused("LME functions on a circle of nodes do", "take \"support\": \"separable\""),
+            Some(product) if product.width() > WIDEST => {
+                return refused("functions of more than 16 nodes an axis do", "take a larger gamma");
+            }
+            Some(_) => {}
         }
         if self.is_mixed() {
             let cure = "set solver.krylov.preconditioner to \"block_jacobi\"";

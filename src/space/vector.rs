@@ -83,7 +83,7 @@ pub trait Vectors {
 
     /// A copy of x.
     fn copied(&self, x: &Self::Vector) -> Self::Owned {
-        let mut copy = self.zeros(self.len(x));
+        let mut copy = self.unspecified(self.len(x));
         self.copy(x, &mut copy);
         copy
     }

@@ -197,6 +197,7 @@ Result cuDeviceGetAttribute(int *value, int attribute, int device) {
     }
     return device_found(device);
 }
+Result cuDriverGetVersion(int *version) { return *version = (int)number("BFREE_GPU_DRIVER", 12000), CUDA_SUCCESS; }
 Result cuDevicePrimaryCtxRetain(void **out, int device) {
     *out = &context;
     return failed ? CUDA_ERROR_LAUNCH_FAILED : device_found(device);
@@ -263,6 +264,11 @@ Result cuMemFree_v2(Pointer pointer) {
 }
 Result cuMemAllocAsync(Pointer *out, size_t bytes, void *stream) {
     return stream ? CUDA_ERROR_INVALID_HANDLE : cuMemAlloc_v2(out, bytes);
+}
+// The memory pool keeps nothing here.
+Result cuDeviceGetDefaultMemPool(void **pool, int device) { return *pool = &memory, device_found(device); }
+Result cuMemPoolSetAttribute(void *pool, int attribute, void *value) {
+    return pool == &memory && attribute == 4 && value ? CUDA_SUCCESS : CUDA_ERROR_INVALID_VALUE; // RELEASE_THRESHOLD
 }
 Result cuMemFreeAsync(Pointer pointer, void *stream) { return stream ? CUDA_ERROR_INVALID_HANDLE : cuMemFree_v2(pointer); }
 

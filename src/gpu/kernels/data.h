@@ -6,6 +6,16 @@
 #define TURN (THREADS / LANES)
 // The widest tile of nodes along x that is summed at a time (`kernel.rs`).
 #define WIDEST_TILE 6
+// Calls a macro with the width of a tile as a constant.
+#define WITH_WIDTH(width, call)    \
+    switch (width) {               \
+    case 1: call(1); break;        \
+    case 2: call(2); break;        \
+    case 3: call(3); break;        \
+    case 4: call(4); break;        \
+    case 5: call(5); break;        \
+    default: call(6);              \
+    }
 // The forms of a tangent (`constitutive/tangents.rs`).
 #define CLOSED 0
 #define CLOSED_WITH_FACTORS 1
@@ -52,10 +62,15 @@ struct Product {
     // The nodal field, and the boxes of all blocks.
     const double *u;
     double *boxes;
-    // Masses of the particles by group and lane; none without inertia or with a lumped mass.
+    // Masses of the particles by group and lane, and 1 − ε; none without inertia or with a lumped mass.
     const double *mass;
     double mass_factor;
+    double consistent;
     int sets;
+    // Groups whose rows are summed at a time, and the most rows and nodes of a window.
+    int together;
+    int window_rows;
+    int window_nodes;
     struct Rows rows[SETS];
 };
 

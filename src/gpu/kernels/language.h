@@ -22,6 +22,7 @@ extern _Thread_local unsigned emulated_block;
 extern _Thread_local double emulated_shared[];
 int emulated_thread(int step);
 #define FUNCTION static inline
+#define UNROLL
 #define BLOCK emulated_block
 #define SHARED(type, name) type *name = (type *)emulated_shared
 #define PHASE(t) for (int step_##t = 0, t = emulated_thread(0); step_##t < THREADS; t = emulated_thread(++step_##t))
@@ -32,6 +33,7 @@ int emulated_thread(int step);
     static void name##_of_block(const struct type a)
 #else
 #define FUNCTION static __device__ __forceinline__
+#define UNROLL _Pragma("unroll 16")
 #define BLOCK blockIdx.x
 #define SHARED(type, name)                            \
     extern __shared__ double shared_memory[];         \

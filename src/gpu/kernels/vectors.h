@@ -37,11 +37,15 @@ KERNEL(scaled, Update) {
     }
 }
 
-// A thread block sums a chunk. All threads write the chunk's numbers to shared memory. Then each accumulator adds every eighth of them, in
+// A thread block sums a chunk; the processor adds the chunks, in order. All threads write the chunk's numbers to shared memory. Then each accumulator adds every eighth of them, in
 // order, and the accumulators are added.
 FUNCTION double accumulate(const double *numbers, int t, i64 left) {
     double sum = 0.0;
-    for (int k = t; k < CHUNK && k < left; k += ACCUMULATORS) sum += numbers[k];
+    if (left >= CHUNK) {
+        UNROLL for (int k = t; k < CHUNK; k += ACCUMULATORS) sum += numbers[k];
+    } else {
+        for (int k = t; k < left; k += ACCUMULATORS) sum += numbers[k];
+    }
     return sum;
 }
 
@@ -107,32 +111,6 @@ KERNEL(advance, Advance) {
     }
 }
 
-struct Sum {
-    double *partial;
-    i64 n;
-};
-
-// Adds the partial sums in their order, and writes the sum behind them. One thread block.
-KERNEL(add_partial, Sum) {
-    SHARED(double, numbers);
-    double *sum = numbers + CHUNK;
-    for (i64 start = 0; start < a.n; start += CHUNK) {
-        PHASE(t) {
-            for (i64 k = t; k < CHUNK && start + k < a.n; k += THREADS) numbers[k] = a.partial[start + k];
-        }
-        PHASE(t) {
-            if (t == 0) {
-                double partial = start == 0 ? 0.0 : *sum;
-                for (i64 k = 0; k < CHUNK && start + k < a.n; k++) partial += numbers[k];
-                *sum = partial;
-            }
-        }
-    }
-    PHASE(t) {
-        if (t == 0) a.partial[a.n] = *sum;
-    }
-}
-
 struct Blocks {
     const double *blocks;
     const double *r;
@@ -168,5 +146,24 @@ KERNEL(axpby, Update) {
     PHASE(t) {
         i64 i = ITEM(t);
         if (i < a.n) a.y[i] = a.b * a.y[i] + a.a * a.x[i];
+    }
+}
+
+struct Move {
+    const double *p;
+    const double *q;
+    double *x;
+    double *r;
+    i64 n;
+};
+
+// x ← x + p, r ← r − q
+KERNEL(move_along, Move) {
+    PHASE(t) {
+        i64 i = ITEM(t);
+        if (i < a.n) {
+            a.x[i] += a.p[i];
+            a.r[i] -= a.q[i];
+        }
     }
 }

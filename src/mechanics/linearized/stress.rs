@@ -1,11 +1,11 @@
 //! The linearised tangents of the laws, as rows of numbers.
 
-use crate::gpu::{self, Gpu};
+use crate::gpu::{self, Buffer, Gpu};
 use crate::lanes::LANES;
 use crate::mechanics::constitutive::{AddTo, Form, Product, add_quadratic, product};
 use crate::mechanics::sweep::{At, Group, Quadratic};
 use crate::pooled::Pooled;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// δσ = 𝔸 : L at all particles, one particle per lane.
 #[derive(Clone, Debug)]
@@ -14,12 +14,14 @@ pub(crate) struct StressRows {
     /// For each group of particles, the numbers of its tangents.
     rows: Arc<Pooled<[f64; LANES]>>,
     factor: f64,
+    /// The copy on a device, which all clones share.
+    copy: Arc<OnceLock<Arc<Buffer<f64>>>>,
 }
 
 impl StressRows {
     /// Tangents that are stored in `form`.
     pub(crate) fn new(form: Form, rows: Pooled<[f64; LANES]>) -> Self {
-        Self { form, rows: Arc::new(rows), factor: 1.0 }
+        Self { form, rows: Arc::new(rows), factor: 1.0, copy: Arc::default() }
     }
 
     pub(crate) fn times(self, factor: f64) -> Self {
@@ -28,7 +30,7 @@ impl StressRows {
 
     /// A copy on a device.
     pub(crate) fn on_device(&self, gpu: &Gpu, dimension: usize) -> gpu::Rows {
-        let rows = Arc::new(gpu.copy_of(self.rows.as_flattened()));
+        let rows = self.copy.get_or_init(|| Arc::new(gpu.copy_of(self.rows.as_flattened()))).clone();
         gpu::Rows { rows, factor: self.factor, form: self.form as i32, count: self.form.rows(dimension), cells: None }
     }
 

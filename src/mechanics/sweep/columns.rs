@@ -167,7 +167,7 @@ impl WithLanes for Places<'_> {
 }
 
 /// The largest number of nodes along an axis for which [`Columns`] have room.
-pub(super) const WIDEST: usize = 16;
+pub(crate) const WIDEST: usize = 16;
 
 /// The functions along one axis at up to eight coordinates, a lane each.
 #[derive(Default)]

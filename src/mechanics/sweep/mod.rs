@@ -50,6 +50,7 @@ mod tiled;
 pub use at_particle::AtParticle;
 pub use blocks::Quadratic;
 pub(crate) use blocks::pair;
+pub(crate) use columns::WIDEST;
 pub use fields::Fields;
 pub use group::{At, Group};
 pub(crate) use lattice::stride;

@@ -3,7 +3,7 @@
 use super::Supports;
 use super::supports::Implementation;
 use super::tiled::Tiled;
-use crate::gpu::{Gpu, Transfer, TransferArrays};
+use crate::gpu::{Gpu, Masses, Transfer, TransferArrays};
 use crate::lanes::LANES;
 use std::sync::Arc;
 
@@ -23,14 +23,26 @@ impl<const D: usize> Supports<D> {
         };
         Some(self.on_device.get_or_init(copied))
     }
+
+    /// The masses of particles and nodes on the device, copied there at the first call.
+    pub(crate) fn masses_on_device(&self, gpu: &Gpu, mass: impl Fn(usize) -> f64, lumped: &[f64]) -> Arc<Masses> {
+        let by_lane = || match &self.implementation {
+            Implementation::Plain(_) => Vec::new(),
+            Implementation::Tiled(tiled) => tiled.by_lane(mass),
+        };
+        let copied = || Masses { consistent: gpu.copy_of(&by_lane()), lumped: gpu.copy_of(lumped) };
+        self.masses_on_device.get_or_init(|| Arc::new(copied())).clone()
+    }
 }
 
 impl<const D: usize> Supports<D> {
-    /// Bytes of the shape functions on a device, with the boxes of all blocks; 0 for the plain loop.
-    pub(crate) fn device_bytes(&self) -> usize {
-        let Implementation::Tiled(tiled) = &self.implementation else { return 0 };
+    /// Bytes of the shape functions on a device, with the boxes of all blocks, and bytes of the memory that the threads of a block share; 0 for
+    /// the plain loop.
+    pub(crate) fn device_bytes(&self) -> [usize; 2] {
+        let Implementation::Tiled(tiled) = &self.implementation else { return [0; 2] };
         let weights: usize = tiled.blocks.iter().map(|block| size_of_val(block.weights.as_slice())).sum();
-        tiled.arrays(self.nodes.len()).bytes() + weights
+        let arrays = tiled.arrays(self.nodes.len());
+        [arrays.bytes() + weights, arrays.shared()]
     }
 }
 
@@ -68,15 +80,5 @@ impl<const D: usize> Tiled<D> {
             }
         });
         numbers
-    }
-}
-
-impl<const D: usize> Supports<D> {
-    /// Numbers of the particles by group and lane. Lanes without a particle have zeros.
-    pub(crate) fn by_lane(&self, of: impl Fn(usize) -> f64) -> Vec<f64> {
-        match &self.implementation {
-            Implementation::Plain(_) => Vec::new(),
-            Implementation::Tiled(tiled) => tiled.by_lane(of),
-        }
     }
 }

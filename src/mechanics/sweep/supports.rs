@@ -7,7 +7,7 @@ use super::points::{Points, SupportError};
 use super::tiled::Tiled;
 use crate::aggregation::Extension;
 use crate::approximation::ShapeFunction;
-use crate::gpu::{Gpu, Transfer};
+use crate::gpu::{Gpu, Masses, Transfer};
 use crate::grid::Grid;
 use crate::pooled::{Element, Pool, Pooled};
 use crate::scalar::Real;
@@ -57,8 +57,9 @@ pub struct Supports<const D: usize> {
     extension: Option<Arc<Extension>>,
     /// The device on which linear systems are solved.
     pub(super) gpu: Option<Arc<Gpu>>,
-    /// The shape functions in its memory.
+    /// The shape functions and the masses in its memory.
     pub(super) on_device: OnceLock<Arc<Transfer>>,
+    pub(super) masses_on_device: OnceLock<Arc<Masses>>,
 }
 
 /// An implementation of the loop over the particles.
@@ -187,8 +188,9 @@ impl<const D: usize> Supports<D> {
 
     fn of_implementation(implementation: Implementation<D>, grid: &Grid<D>, nodes: &Nodes, pool: &Pool) -> Self {
         let (nodes, passes, pool) = (nodes.clone(), AtomicU64::new(0), pool.clone());
-        let (fields, gpu, on_device) = (Vec::new(), None, OnceLock::new());
-        Self { implementation, grid: *grid, nodes, fields, passes, pool, extension: None, gpu, on_device }
+        let (fields, gpu, on_device, masses_on_device) = (Vec::new(), None, OnceLock::new(), OnceLock::new());
+        let extension = None;
+        Self { implementation, grid: *grid, nodes, fields, passes, pool, extension, gpu, on_device, masses_on_device }
     }
 
     /// These supports with an extension u = E û: outer nodes follow inner ones, and equilibria are solved for the inner nodes alone.

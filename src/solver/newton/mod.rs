@@ -125,6 +125,7 @@ impl<E: std::error::Error + 'static> Newton<'_, E> {
                 Ok(Some(taken)) => self.history.iterations.push(taken),
                 Ok(None) => return Ok(Convergence::RoundOff),
                 Err(cause @ NewtonFailure::Inadmissible { .. }) => return Err(cause),
+                Err(cause) if cause.is_of_device() => return Err(cause),
                 // The remaining R may be round-off, which need not lie in the range of K.
                 Err(_) if self.residual <= self.round_off()? => return Ok(Convergence::RoundOff),
                 Err(cause) => return Err(cause),

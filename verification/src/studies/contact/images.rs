@@ -140,7 +140,7 @@ fn end(image: &Image, scene: &Scene) -> Result<Option<End>, StudyError> {
 }
 
 pub(super) fn report(effort: &Effort) -> Result<Report, StudyError> {
-    let count = if *effort == Effort::Full { 60 } else { 1 };
+    let count = if *effort == Effort::Full { 12 } else { 1 };
     let title =
         "random scenes with contact and their images: largest difference of a momentum, over the largest momentum";
     let mut report = Report::new(title, &["seed", "image"]);
