@@ -333,7 +333,7 @@ impl Gpu {
         if blocks == 0 || self.has_failed() {
             return;
         }
-        let Some(function) = self.function(kernel, shared) else { return };
+        let Some(function) = self.function(kernel, shared, size_of::<T>()) else { return };
         let grid_dim = (blocks as u32, 1, 1);
         let config = LaunchConfig { grid_dim, block_dim: (THREADS as u32, 1, 1), shared_mem_bytes: shared as u32 };
         let argument = Argument(*arguments);
@@ -348,9 +348,14 @@ impl Gpu {
         self.launch(kernel, items.div_ceil(THREADS), 0, arguments);
     }
 
-    /// A kernel that may have so much shared memory.
-    fn function(&self, kernel: &'static str, shared: usize) -> Option<CudaFunction> {
+    /// A kernel that may have so much shared memory, and takes an argument of so many bytes.
+    fn function(&self, kernel: &'static str, shared: usize, argument: usize) -> Option<CudaFunction> {
         let mut functions = locked(&self.functions);
+        if !functions.contains_key(kernel) && !KERNELS.contains(&format!(" {kernel}_param_0[{argument}]")) {
+            let (call, error) = (kernel.to_owned(), format!("it takes no argument of {argument} bytes"));
+            self.keep_failure(Err(GpuError::Driver { call, error }));
+            return None;
+        }
         self.keep(kernel, self.stream.context().bind_to_thread())?;
         if !functions.contains_key(kernel) {
             functions.insert(kernel, (self.keep(kernel, self.module.load_function(kernel))?, SHARED));

@@ -8,16 +8,22 @@
 //! The tests run the kernels on a driver that is emulated by gcc (`tests/gpu/`).
 
 mod device;
+mod followers;
 mod multigrid;
 mod points;
 mod product;
 #[cfg(test)]
 mod record;
+mod rows;
+mod transfer;
 mod vectors;
 
 pub(crate) use device::Buffer;
 pub use device::{Gpu, GpuError};
+pub(crate) use followers::Followers;
 pub(crate) use multigrid::{Filter, Level, LevelArrays};
 pub(crate) use points::{NO_OBSTACLE, PointArrays, Points};
-pub(crate) use product::{Cells, Followers, Inertia, Masses, Product, Rows, SETS, Transfer, TransferArrays};
+pub(crate) use product::{Inertia, Masses, Product, SETS};
+pub(crate) use rows::{Cells, Rows};
+pub(crate) use transfer::{Transfer, TransferArrays};
 pub use vectors::GpuVector;

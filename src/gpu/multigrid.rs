@@ -1,7 +1,7 @@
 //! The levels and the filter of multigrid on a device (`kernels/multigrid.h`).
 
 use super::device::{Buffer, Gpu};
-use super::product::{Followers, clear_fixed};
+use super::followers::{Followers, clear_fixed};
 use super::vectors::GpuVector;
 use crate::space::vector::Vectors;
 

@@ -1,9 +1,10 @@
 //! The GPU: its product and its solver against those of the processor. The kernels run on a driver that gcc makes of them
 //! (`tests/gpu/driver.c`), with threads and blocks as loops in three orders. The program finds it like the real one.
 
-use crate::support::{Failure, Said, said};
+use crate::support::{Failure, Said, said, scene};
 use bfree::gpu::Gpu;
 use bfree::mechanics::check::direction;
+use bfree::plan::Plan;
 use bfree::solver::Linearization;
 use bfree::space::vector::Vectors;
 use bfree::tensor::Vector;
@@ -291,5 +292,31 @@ fn the_tangent_check_sees_the_product_of_the_gpu() -> Result<(), Failure> {
     let arguments = ["--steps", "2", "--gpu", "--check-tangent"];
     let said = run(&mut emulated(bfree(), "forward"), "rebound.json", &directory.path().join("right"), &arguments)?;
     assert_eq!(said.0, Some(0), "{}", said.2);
+    Ok(())
+}
+
+/// `bfree check --gpu` plans the memory that a run takes at most on the device.
+#[test]
+fn the_memory_of_the_device_is_planned() -> Result<(), Failure> {
+    const DYNAMIC: &[&str] =
+        &["time.scheme=\"newmark\"", "time.lumping=0.5", "time.step=0.001", "gravity.curve=[[0,1]]"];
+    let spacing = "grid.spacing=0.125";
+    for (functions, more) in [("\"linear\"", DYNAMIC), ("{\"bspline\":{\"degree\":3}}", &["time.step=0.5"])] {
+        let functions = format!("approximation={functions}");
+        let sets = [&[spacing, functions.as_str()], more].concat();
+        let planned = Plan::of(&scene::<3>("block_static.json", &sets)?)?.on_gpu.bytes as f64;
+        let directory = tempfile::tempdir()?;
+        let log = directory.path().join("log");
+        let mut command = emulated(bfree(), "forward");
+        command.env("BFREE_GPU_LOG", &log);
+        let mut arguments = vec!["--gpu", "--steps", "1"];
+        sets.iter().for_each(|set| arguments.extend(["--set", set]));
+        let said = run(&mut command, "block_static.json", &directory.path().join("run"), &arguments)?;
+        assert_eq!(said.0, Some(0), "{}", said.2);
+        let text = std::fs::read_to_string(&log)?;
+        let peak: f64 = text.split_whitespace().skip_while(|word| *word != "peak").nth(1).ok_or("no peak")?.parse()?;
+        // Levels of multigrid are bounded by their number of nodes.
+        assert!((1.0 / 1.05..1.2).contains(&(planned / peak)), "{functions}: {planned} planned, {peak} taken");
+    }
     Ok(())
 }

@@ -1,0 +1,183 @@
+//! The shape functions of all particles on a device (`Transfer` of `kernels/data.h`).
+
+use super::device::{Buffer, Gpu, THREADS};
+use crate::lanes::LANES;
+use std::sync::Arc;
+
+/// Weights that are copied at a time.
+const PART: usize = 4 << 20;
+
+/// Bytes of shared memory for the rows of groups that are summed at a time. Four thread blocks then fit on a multiprocessor.
+const STAGED: usize = 12 << 10;
+
+/// Bytes of `Window` of `kernels/data.h`.
+const WINDOW: usize = 64;
+
+/// The shape functions of all particles as plain arrays, block by block. Without the weights, which are large.
+#[derive(Debug, Default)]
+pub(crate) struct TransferArrays {
+    pub dimension: usize,
+    /// Number of active nodes.
+    pub nodal: usize,
+    /// Of each block, and at the end: the first group, the first entry of `nodes`, and the first place of all boxes.
+    pub group_first: Vec<u32>,
+    pub node_first: Vec<u32>,
+    pub box_first: Vec<u32>,
+    /// Nodes of each box along the three axes.
+    pub size: Vec<u32>,
+    /// Of each group: the first row of its weights, the first node of its window as a place in the box, and its widths and lanes, a byte each.
+    pub weights_first: Vec<u32>,
+    pub window_first: Vec<u32>,
+    pub window_shape: Vec<u32>,
+    /// Of each active node of a block: its number, and its place in the box.
+    pub nodes: Vec<u32>,
+    pub places: Vec<u32>,
+}
+
+impl TransferArrays {
+    /// For each node, the start of its entries, and the entries: the places of all boxes that belong to it, in the order of the blocks.
+    fn entries(&self) -> [Vec<u32>; 2] {
+        let mut first = vec![0; self.nodal + 1];
+        self.nodes.iter().for_each(|&node| first[node as usize + 1] += 1);
+        (0..self.nodal).for_each(|node| first[node + 1] += first[node]);
+        let (mut next, mut entries) = (first.clone(), vec![0; self.nodes.len()]);
+        for (block, bounds) in self.node_first.windows(2).enumerate() {
+            let own = bounds[0] as usize..bounds[1] as usize;
+            for (&node, &place) in self.nodes[own.clone()].iter().zip(&self.places[own]) {
+                let next = &mut next[node as usize];
+                entries[*next as usize] = self.box_first[block] + place;
+                *next += 1;
+            }
+        }
+        [first, entries]
+    }
+
+    /// Bytes on a device, with the entries of the nodes and the boxes, without the weights.
+    pub(crate) fn bytes(&self) -> usize {
+        let lists = [&self.group_first, &self.node_first, &self.box_first, &self.size, &self.weights_first];
+        let more = [&self.window_first, &self.window_shape, &self.nodes, &self.places, &self.nodes];
+        let numbers: usize = lists.into_iter().chain(more).map(Vec::len).sum::<usize>() + self.nodal + 1;
+        let places = self.box_first.last().map_or(0, |&places| places as usize);
+        numbers * size_of::<u32>() + places * self.dimension * size_of::<f64>()
+    }
+
+    /// Bytes of shared memory of a thread block: two boxes, the numbers of its particles, the windows of its groups, and the rows of the groups
+    /// that are summed at a time.
+    pub(crate) fn shared(&self) -> usize {
+        let largest = self.box_first.windows(2).map(|bounds| bounds[1] - bounds[0]).max().unwrap_or(0) as usize;
+        let numbers = self.dimension * (1 + self.dimension);
+        let staged = self.dimension * self.largest_window().together(self.dimension) * self.largest_window().nodes;
+        size_of::<f64>() * (2 * self.dimension * largest + numbers * THREADS + staged) + THREADS / LANES * WINDOW
+    }
+
+    /// The most rows along x and nodes of a window.
+    fn largest_window(&self) -> LargestWindow {
+        let mut largest = LargestWindow { rows: 1, nodes: 1 };
+        for [x, y, z, _] in self.window_shape.iter().map(|shape| shape.to_le_bytes()) {
+            let rows = usize::from(y) * usize::from(z);
+            largest = LargestWindow { rows: largest.rows.max(rows), nodes: largest.nodes.max(usize::from(x) * rows) };
+        }
+        largest
+    }
+}
+
+/// The most rows along x and nodes of a window.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LargestWindow {
+    pub(super) rows: usize,
+    pub(super) nodes: usize,
+}
+
+impl LargestWindow {
+    /// Groups of particles whose rows are summed at a time.
+    pub(super) fn together(self, dimension: usize) -> usize {
+        (STAGED / (self.nodes * dimension * size_of::<f64>())).clamp(1, THREADS / LANES)
+    }
+}
+
+/// The shape functions of all particles on a device.
+#[derive(Debug)]
+pub(crate) struct Transfer {
+    gpu: Arc<Gpu>,
+    pub(super) dimension: usize,
+    pub(super) blocks: usize,
+    pub(super) nodal: usize,
+    pub(super) shared: usize,
+    pub(super) window: LargestWindow,
+    /// The arrays of [`TransferArrays`], then the entries of the nodes.
+    pub(super) arrays: [Buffer<u32>; 11],
+    weights: Buffer<f64>,
+    pub(super) boxes: Buffer<f64>,
+}
+
+/// `Transfer` of `kernels/data.h`.
+#[derive(Clone, Copy)]
+#[repr(C)]
+pub(super) struct TransferArguments {
+    before_weights: [u64; 7],
+    weights: u64,
+    after_weights: [u64; 4],
+}
+
+impl Transfer {
+    /// Copies the arrays to a device, and the weights of block after block.
+    pub(crate) fn new<'a>(
+        gpu: Arc<Gpu>,
+        arrays: &TransferArrays,
+        weights: impl Iterator<Item = &'a [[f64; LANES]]> + Clone,
+    ) -> Self {
+        gpu.keep_failure(gpu.check_shared(arrays.shared()));
+        let rows = weights.clone().map(<[_]>::len).sum::<usize>();
+        let (mut on_device, mut at, mut part) = (gpu.memory_for(rows * LANES), 0, Vec::with_capacity(PART));
+        for rows in weights {
+            if part.len() + rows.len() * LANES > PART {
+                gpu.write_at(&part, &mut on_device, at);
+                at += part.len();
+                part.clear();
+            }
+            part.extend_from_slice(rows.as_flattened());
+        }
+        gpu.write_at(&part, &mut on_device, at);
+        let places = arrays.box_first.last().copied().unwrap_or(0) as usize;
+        let [entry_first, entries] = arrays.entries();
+        let a = arrays;
+        let lists = [
+            &a.group_first,
+            &a.node_first,
+            &a.box_first,
+            &a.size,
+            &a.weights_first,
+            &a.window_first,
+            &a.window_shape,
+            &a.nodes,
+            &a.places,
+            &entry_first,
+            &entries,
+        ];
+        Self {
+            dimension: a.dimension,
+            blocks: a.group_first.len().saturating_sub(1),
+            nodal: a.nodal,
+            shared: a.shared(),
+            window: a.largest_window(),
+            arrays: lists.map(|list| gpu.copy_of(list)),
+            weights: on_device,
+            boxes: gpu.memory_for(places * a.dimension),
+            gpu,
+        }
+    }
+
+    /// The device.
+    pub(crate) fn gpu(&self) -> &Arc<Gpu> {
+        &self.gpu
+    }
+
+    pub(super) fn arguments(&self) -> TransferArguments {
+        let at = |k: usize| self.arrays[k].address();
+        TransferArguments {
+            before_weights: std::array::from_fn(at),
+            weights: self.weights.address(),
+            after_weights: std::array::from_fn(|k| at(7 + k)),
+        }
+    }
+}
