@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use std::num::NonZeroU64;
 
 /// A block that floats, and a rigid disc that spins and flies towards it, off its middle.
-fn flying() -> Value {
+pub fn flying() -> Value {
     merged(
         json!({
             "grid": { "size": [4, 3], "spacing": 0.125 },
@@ -24,7 +24,7 @@ fn flying() -> Value {
 }
 
 /// A ball in 3D on a corner of a block, with everything in motion.
-fn flying_3d() -> Value {
+pub fn flying_3d() -> Value {
     merged(
         json!({
             "grid": { "size": [2, 2, 2], "spacing": 0.25 },
