@@ -1,11 +1,12 @@
 //! The requirements of a scene: the terms in use and why, the number of unknowns, and the memory of each array.
 
 mod arrays;
+mod on_gpu;
 
-pub use arrays::{ArrayUse, DeviceUse};
+pub use arrays::ArrayUse;
+pub use on_gpu::DeviceUse;
 
 use crate::approximation::ShapeFunction;
-use crate::gpu::{Gpu, GpuError};
 use crate::material::Law;
 use crate::mechanics::dilatation::Cells;
 use crate::mechanics::loads::PrescribedDof;
@@ -17,7 +18,7 @@ use crate::particles::Body;
 use crate::simulation::{SharedNodes, Simulation};
 use crate::solver::{Krylov, Preconditioning};
 use crate::tensor::Vector;
-use arrays::{arrays, device_use};
+use arrays::arrays;
 use indicatif::BinaryBytes;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -146,8 +147,6 @@ pub struct Plan {
     pub terms: Vec<TermUse>,
     /// The large arrays.
     pub arrays: Vec<ArrayUse>,
-    /// Memory on a GPU, if the linear systems are solved there.
-    pub on_gpu: DeviceUse,
     /// The points and the area assumed for each loaded surface.
     pub surfaces: Vec<SurfaceUse>,
     /// Bodies that share nodes at the start, in words.
@@ -178,22 +177,9 @@ impl Plan {
             preconditioner: simulation.preconditioner(),
             terms: terms(simulation, &supports, cells),
             arrays: arrays(simulation, &supports, cells),
-            on_gpu: device_use(simulation, &supports),
             surfaces: SurfaceUse::of(simulation),
             shared_nodes: shared_nodes(simulation, &supports),
         })
-    }
-
-    /// Whether the linear systems fit on a device. Returns the free bytes of its memory.
-    ///
-    /// # Errors
-    /// They do not fit.
-    pub(crate) fn check_fits_on(&self, gpu: &Gpu) -> Result<u64, GpuError> {
-        let DeviceUse { bytes, shared } = self.on_gpu;
-        gpu.check_shared(shared as usize)?;
-        let (free, total) = gpu.memory().ok_or_else(|| GpuError::NoDevice("its memory is unknown".to_owned()))?;
-        let (bytes, fits) = (bytes as usize, bytes <= free as u64);
-        if fits { Ok(free as u64) } else { Err(GpuError::Memory { bytes, free, total }) }
     }
 
     /// Bytes of all arrays together. A step reuses the arrays of the step before.

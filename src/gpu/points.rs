@@ -1,6 +1,7 @@
 //! The linearised forces of surface points on a device (`kernels/points.h`).
 
 use super::device::{Buffer, Gpu};
+use super::transfer::by_node;
 use super::vectors::GpuVector;
 
 /// Components of the motion of a free obstacle.
@@ -79,19 +80,11 @@ pub(super) struct PointSums {
 impl PointArrays {
     /// For each of `nodal` nodes the first of its points, and the points with weights, in the order of the points.
     fn by_node(&self, nodal: usize) -> ([Vec<u32>; 2], Vec<f64>) {
-        let mut first = vec![0; nodal + 1];
-        self.nodes.iter().for_each(|&node| first[node as usize + 1] += 1);
-        (0..nodal).for_each(|node| first[node + 1] += first[node]);
-        let (mut next, mut points) = (first.clone(), vec![0; self.nodes.len()]);
-        let mut weights = vec![0.0; self.nodes.len()];
-        for (point, bounds) in self.first.windows(2).enumerate() {
-            for entry in bounds[0] as usize..bounds[1] as usize {
-                let next = &mut next[self.nodes[entry] as usize];
-                points[*next as usize] = point as u32;
-                weights[*next as usize] = self.weights[entry];
-                *next += 1;
-            }
-        }
+        let [first, entries] = by_node(&self.nodes, nodal);
+        let bounds = self.first.windows(2).zip(0..);
+        let points: Vec<u32> = bounds.flat_map(|(bounds, point)| (bounds[0]..bounds[1]).map(move |_| point)).collect();
+        let of = |entry: &u32| (points[*entry as usize], self.weights[*entry as usize]);
+        let (points, weights) = entries.iter().map(of).unzip();
         ([first, points], weights)
     }
 }

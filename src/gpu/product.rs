@@ -97,7 +97,7 @@ impl Product {
         clear_fixed(gpu, &self.prescribed, y);
     }
 
-    /// The product at all nodes, except those whose address is given as prescribed.
+    /// K u at all nodes. `prescribed` is the address of the mask of the values that become zero, or 0.
     fn apply_to_all(&self, u: &GpuVector, prescribed: u64, y: &mut GpuVector) {
         let (gpu, transfer) = (self.transfer.gpu(), &*self.transfer);
         let has_mass = self.inertia.as_ref().filter(|of| of.lumping < 1.0);

@@ -37,19 +37,11 @@ pub(crate) struct TransferArrays {
 impl TransferArrays {
     /// For each node, the start of its entries, and the entries: the places of all boxes that belong to it, in the order of the blocks.
     fn entries(&self) -> [Vec<u32>; 2] {
-        let mut first = vec![0; self.nodal + 1];
-        self.nodes.iter().for_each(|&node| first[node as usize + 1] += 1);
-        (0..self.nodal).for_each(|node| first[node + 1] += first[node]);
-        let (mut next, mut entries) = (first.clone(), vec![0; self.nodes.len()]);
-        for (block, bounds) in self.node_first.windows(2).enumerate() {
-            let own = bounds[0] as usize..bounds[1] as usize;
-            for (&node, &place) in self.nodes[own.clone()].iter().zip(&self.places[own]) {
-                let next = &mut next[node as usize];
-                entries[*next as usize] = self.box_first[block] + place;
-                *next += 1;
-            }
-        }
-        [first, entries]
+        let bounds = self.node_first.windows(2).zip(&self.box_first);
+        let own = bounds.map(|(bounds, first)| (&self.places[bounds[0] as usize..bounds[1] as usize], first));
+        let places: Vec<u32> = own.flat_map(|(own, first)| own.iter().map(move |place| first + place)).collect();
+        let [first, order] = by_node(&self.nodes, self.nodal);
+        [first, order.into_iter().map(|entry| places[entry as usize]).collect()]
     }
 
     /// Bytes on a device, with the entries of the nodes and the boxes, without the weights.
@@ -79,6 +71,20 @@ impl TransferArrays {
         }
         largest
     }
+}
+
+/// For each of `nodal` nodes the start of its entries, and the entries: the indices in `nodes` at which the node stands, ascending.
+pub(super) fn by_node(nodes: &[u32], nodal: usize) -> [Vec<u32>; 2] {
+    let mut first = vec![0; nodal + 1];
+    nodes.iter().for_each(|&node| first[node as usize + 1] += 1);
+    (0..nodal).for_each(|node| first[node + 1] += first[node]);
+    let (mut next, mut entries) = (first.clone(), vec![0; nodes.len()]);
+    for (&node, entry) in nodes.iter().zip(0..) {
+        let next = &mut next[node as usize];
+        entries[*next as usize] = entry;
+        *next += 1;
+    }
+    [first, entries]
 }
 
 /// The most rows along x and nodes of a window.

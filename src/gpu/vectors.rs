@@ -114,12 +114,6 @@ impl Vectors for Gpu {
         Box::new(GpuVector(self.memory_for(n)))
     }
 
-    fn zeros(&self, n: usize) -> Box<GpuVector> {
-        let mut zeros = Box::new(GpuVector(self.memory_for(n)));
-        self.clear(&mut zeros.0);
-        zeros
-    }
-
     fn clear(&self, y: &mut GpuVector) {
         Self::clear(self, &mut y.0);
     }

@@ -45,50 +45,11 @@ pub(super) fn arrays<const D: usize, L: Law, A: ShapeFunction>(
     used.map(|(_, name, bytes)| ArrayUse { name, bytes: bytes as u64 }).collect()
 }
 
-/// Memory that a run takes on a device.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct DeviceUse {
-    /// Bytes of the device's memory.
-    pub bytes: u64,
-    /// Bytes that the threads of a block share.
-    pub shared: u64,
-}
-
-/// The memory that a run of a simulation takes on a device.
-pub(super) fn device_use<const D: usize, L: Law, A: ShapeFunction>(
-    simulation: &Simulation<D, L, A>,
-    supports: &Supports<D>,
-) -> DeviceUse {
-    let (settings, nodes) = (&simulation.settings, supports.active().len());
-    let by_lane = supports.groups() * LANES * NUMBER;
-    let discrete_gradient = simulation.has_mean_stress();
-    let laws = tangent_bytes(&simulation.particles, &simulation.bodies, supports, discrete_gradient);
-    let has_inertia = settings.scheme.has_inertia();
-    let damps = has_inertia && simulation.loads.damping.is_some_and(|damping| damping.stiffness > 0.0);
-    let averages = simulation.bodies.iter().any(Body::averages);
-    let of_cells = if averages { by_lane * (dilatation_rows(D, discrete_gradient) + 1) + by_lane / 2 } else { 0 };
-    let sets = if damps { 2 } else { 1 };
-    let masses = if has_inertia && settings.lumping < 1.0 { by_lane } else { 0 };
-    let multigrid = simulation.preconditioner().0 == Preconditioning::Multigrid;
-    let vectors = match simulation.krylov().0 {
-        // Right-hand side, solution, residual, trial, correction, and the basis.
-        Krylov::Gmres { restart } => restart as usize + 7,
-        // Right-hand side, solution, residual; three iterates, and z, p and q.
-        Krylov::Automatic | Krylov::ConjugateGradient => 9,
-    } + if multigrid { 10 } else { 0 };
-    let levels = if multigrid { multigrid_bytes(nodes, D) - nodes * D.pow(4) * NUMBER } else { 0 };
-    let followers = supports.extension().map_or(0, |extension| extension.bytes() + nodes * D * NUMBER);
-    let nodal = nodes * (NUMBER + D + D * D * NUMBER + D * NUMBER * vectors);
-    let [functions, shared] = supports.device_bytes();
-    let bytes = functions + sets * (laws + of_cells) + masses + levels + followers + nodal;
-    DeviceUse { bytes: bytes as u64, shared: shared as u64 }
-}
-
 /// Whether a run has the array, the name of the array, and its bytes.
 type Row = (bool, &'static str, usize);
 
 /// Bytes of a number.
-const NUMBER: usize = size_of::<f64>();
+pub(super) const NUMBER: usize = size_of::<f64>();
 
 /// The counts and choices of a run on which its arrays depend.
 struct Inventory<'a, const D: usize, L, A> {

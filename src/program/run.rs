@@ -179,12 +179,8 @@ impl Run {
 
     /// Checks that the arrays of the run have room, and takes the GPU if it is asked for.
     fn check_room<const D: usize>(&self, simulation: &mut Simulation<D>) -> Result<(), Failure> {
-        let plan = self.scene.plan(simulation)?;
-        if self.gpu {
-            simulation.use_gpu().map_err(Failure::scene)?;
-        }
-        let gpu = simulation.settings.gpu.as_ref();
-        gpu.map_or(Ok(0), |gpu| plan.check_fits_on(gpu)).map(drop).map_err(Failure::scene)
+        self.scene.plan(simulation)?;
+        if self.gpu { self.scene.plan_on_gpu(simulation).map(drop) } else { Ok(()) }
     }
 
     /// The entries of the report that are known before the first step, and the warnings about the scene. Tells them, too.

@@ -2,11 +2,10 @@
 
 use super::failure::{Failure, print, tell};
 use super::probes::{Bound, bound_probes};
-use crate::gpu::GpuError;
 use crate::material::allow_library;
 use crate::memory;
 use crate::particles::Particles;
-use crate::plan::Plan;
+use crate::plan::{DeviceUse, Plan};
 use crate::scene::{self, Override, Scene, SceneError};
 use crate::simulation::Simulation;
 use clap::Args;
@@ -80,6 +79,18 @@ impl SceneArguments {
         Ok(plan)
     }
 
+    /// Lets the GPU solve the linear systems. Returns the memory that they take there, in words.
+    ///
+    /// # Errors
+    /// There is no GPU, the scene does not run there, or it has too little memory.
+    pub(crate) fn plan_on_gpu<const D: usize>(&self, simulation: &mut Simulation<D>) -> Result<String, Failure> {
+        let gpu = simulation.use_gpu().map_err(Failure::scene)?;
+        let needed = DeviceUse::of(simulation).map_err(|error| self.unusable(error))?;
+        let free = needed.check_fits(&gpu).map_err(Failure::scene)?;
+        let [needed, free] = [needed.bytes, free].map(|bytes| BinaryBytes(bytes as u64));
+        Ok(format!("{needed} on {}, where {free} are free", gpu.name()))
+    }
+
     /// Runs `bfree check`: prints the particles, plan, output and probes of the scene.
     pub(crate) fn check(&self, gpu: bool) -> Result<(), Failure> {
         let scene = self.read()?;
@@ -91,7 +102,7 @@ impl SceneArguments {
     }
 
     fn check_in<const D: usize>(&self, scene: &Scene, gpu: bool) -> Result<(), Failure> {
-        let simulation = self.build::<D>(scene)?;
+        let mut simulation = self.build::<D>(scene)?;
         let mut lines: Vec<String> = scene.title.iter().cloned().collect();
         lines.extend(what_accuracy_sets(scene).map(|set| format!("accuracy      {set}")));
         let (step, end) = (scene.time.step, scene.time.end);
@@ -113,10 +124,9 @@ impl SceneArguments {
             let contact = "contact       bodies feel each other before their surfaces meet";
             lines.push(format!("{contact}: {felt}, see docs/src/limits.md"));
         }
-        let plan = self.plan(&simulation)?;
-        lines.push(plan.to_string());
+        lines.push(self.plan(&simulation)?.to_string());
         if gpu {
-            lines.push(on_gpu(simulation.clone(), &plan)?);
+            lines.push(format!("gpu           {}", self.plan_on_gpu(&mut simulation)?));
         }
         lines.push(format!("output        {}", written(scene)));
         let probes = bound_probes(scene, &simulation);
@@ -126,22 +136,6 @@ impl SceneArguments {
         }
         print(lines.join("\n"))
     }
-}
-
-/// The memory that a run takes on the GPU, in words.
-///
-/// # Errors
-/// There is no GPU, or the scene does not run there.
-fn on_gpu<const D: usize>(mut simulation: Simulation<D>, plan: &Plan) -> Result<String, Failure> {
-    simulation.use_gpu().map_err(Failure::scene)?;
-    let gpu = simulation.settings.gpu.ok_or_else(|| Failure::scene(GpuError::NoDriver))?;
-    let free = plan.check_fits_on(&gpu).map_err(Failure::scene)?;
-    Ok(format!(
-        "gpu           {} on {}, where {} are free",
-        BinaryBytes(plan.on_gpu.bytes),
-        gpu.name(),
-        BinaryBytes(free)
-    ))
 }
 
 /// The fields in the snapshots, in words. No other field is computed, except for probes.

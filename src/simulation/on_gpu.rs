@@ -8,14 +8,14 @@ use crate::mechanics::sweep::WIDEST;
 use std::sync::Arc;
 
 impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
-    /// Solves the linear systems of all further steps on the GPU of this machine.
+    /// Solves the linear systems of all further steps on the GPU of this machine, which is returned.
     ///
     /// ```
     /// use bfree::gpu::GpuError;
     ///
     /// let mut simulation = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?.build::<2>("scenes".as_ref())?;
     /// match simulation.use_gpu() {
-    ///     Ok(()) => assert!(simulation.settings.gpu.is_some()),
+    ///     Ok(gpu) => println!("on {}", gpu.name()),
     ///     Err(GpuError::NoDriver) => println!("no driver: the processor solves them"),
     ///     Err(other) => return Err(other.into()),
     /// }
@@ -24,17 +24,18 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     ///
     /// # Errors
     /// A part of the simulation does not run there, or there is no device.
-    pub fn use_gpu(&mut self) -> Result<(), GpuError> {
+    pub fn use_gpu(&mut self) -> Result<Arc<Gpu>, GpuError> {
         self.check_gpu()?;
-        self.settings.gpu = Some(Arc::new(Gpu::open()?));
-        Ok(())
+        let gpu = Arc::new(Gpu::open()?);
+        self.settings.gpu = Some(gpu.clone());
+        Ok(gpu)
     }
 
     /// Whether the linear systems can be solved on a GPU.
     ///
     /// # Errors
     /// The first part that cannot.
-    pub(crate) fn check_gpu(&self) -> Result<(), GpuError> {
+    fn check_gpu(&self) -> Result<(), GpuError> {
         let refused = |part, cure| Err(GpuError::NotYet { part, cure });
         match self.approximation.separable() {
             None => return refused("LME functions on a circle of nodes do", "take \"support\": \"separable\""),

@@ -1,4 +1,4 @@
-//! Krylov and Newton methods on plain vectors. Preconditioners also know forms on the cells of a grid; laws and particles they do not know.
+//! Krylov and Newton methods on vectors, which lie in the memory of the processor or of a device. Preconditioners also know forms on the cells of a grid; laws and particles they do not know.
 //!
 //! A nodal field of `D` components per node is one flat `&[f64]`, node after node. No constant in this folder has a unit. A problem whose
 //! unknowns and residual are multiplied by powers of two takes the same iterations with the same bits.

@@ -36,12 +36,7 @@ pub trait Vectors {
     fn len(&self, x: &Self::Vector) -> usize;
 
     /// `n` entries that are unspecified.
-    fn unspecified(&self, n: usize) -> Self::Owned {
-        self.zeros(n)
-    }
-
-    /// `n` zeros.
-    fn zeros(&self, n: usize) -> Self::Owned;
+    fn unspecified(&self, n: usize) -> Self::Owned;
 
     /// `y ← 0`
     fn clear(&self, y: &mut Self::Vector);
@@ -81,6 +76,13 @@ pub trait Vectors {
         self.norm_with(self.dot(x, x), x)
     }
 
+    /// `n` zeros.
+    fn zeros(&self, n: usize) -> Self::Owned {
+        let mut zeros = self.unspecified(n);
+        self.clear(&mut zeros);
+        zeros
+    }
+
     /// A copy of x.
     fn copied(&self, x: &Self::Vector) -> Self::Owned {
         let mut copy = self.unspecified(self.len(x));
@@ -110,10 +112,6 @@ impl Vectors for Pool {
 
     fn unspecified(&self, n: usize) -> Pooled<f64> {
         Pool::unspecified(self, n, 0.0)
-    }
-
-    fn zeros(&self, n: usize) -> Pooled<f64> {
-        self.filled(n, 0.0)
     }
 
     fn clear(&self, y: &mut [f64]) {
@@ -164,10 +162,6 @@ impl Vectors for Pool {
             *next = x + α * p;
             *r -= α * q;
         })
-    }
-
-    fn copied(&self, x: &[f64]) -> Pooled<f64> {
-        self.collect(x.iter().copied())
     }
 }
 

@@ -3,9 +3,9 @@
 
 use crate::free_obstacles::{flying, flying_3d};
 use crate::support::{Failure, Said, built, said, scene};
-use bfree::gpu::Gpu;
+use bfree::gpu::{Gpu, GpuError};
 use bfree::mechanics::check::direction;
-use bfree::plan::Plan;
+use bfree::plan::DeviceUse;
 use bfree::solver::Linearization;
 use bfree::space::vector::Vectors;
 use bfree::tensor::Vector;
@@ -248,7 +248,7 @@ fn a_gpu_that_cannot_be_used_is_told_in_one_sentence() -> Result<(), Failure> {
         Ok(())
     };
     let arguments = ["--gpu", "--steps", "1"];
-    if Gpu::open().is_err() {
+    if matches!(Gpu::open(), Err(GpuError::NoDriver)) {
         refused(&mut Command::new(bfree()), &arguments, "no NVIDIA driver")?;
     }
     let with = |variable: &str, value: &str| {
@@ -304,7 +304,7 @@ fn the_memory_of_the_device_is_planned() -> Result<(), Failure> {
     for (functions, more) in [("\"linear\"", DYNAMIC), ("{\"bspline\":{\"degree\":3}}", &["time.step=0.5"])] {
         let functions = format!("approximation={functions}");
         let sets = [&[spacing, functions.as_str()], more].concat();
-        let planned = Plan::of(&scene::<3>("block_static.json", &sets)?)?.on_gpu.bytes as f64;
+        let planned = DeviceUse::of(&scene::<3>("block_static.json", &sets)?)?.bytes as f64;
         let directory = tempfile::tempdir()?;
         let log = directory.path().join("log");
         let mut command = emulated(bfree(), "forward");

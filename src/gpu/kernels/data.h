@@ -1,4 +1,5 @@
-// A linearised step as plain arrays, for all dimensions. The structs have the layout of those in `gpu/transfer.rs`.
+// A linearised step as plain arrays, for all dimensions. The files of `src/gpu` have structs with the same layout and
+// names.
 
 // Particles of a group.
 #define LANES 8
@@ -112,7 +113,7 @@ struct Window {
     const double *weights[3];
 };
 
-// So many bytes of shared memory are reserved for each group of a turn (`gpu/product.rs`).
+// So many bytes of shared memory are reserved for each group of a turn (`gpu/transfer.rs`).
 typedef char window_has_64_bytes[sizeof(struct Window) == 64 ? 1 : -1];
 
 FUNCTION int lanes_of(const struct Transfer *a, u32 group) { return a->window_shape[group] >> 24; }
@@ -158,7 +159,7 @@ struct Nodes {
     const double *lumped;
     double lumped_factor;
     const double *u;
-    // Whether a value is prescribed; none where values follow others, which `clear` does after them.
+    // Whether a value is prescribed; none where values follow others: `clear_fixed` then clears them last.
     const u8 *prescribed;
     // Follower pressures, and contact.
     struct PointSums points[2];

@@ -44,10 +44,10 @@ int emulated_thread(int step);
 
 typedef unsigned int u32;
 typedef unsigned char u8;
+typedef long long i64;
 
 // The number of something that does not exist.
 #define NONE 0xffffffffu
-typedef long long i64;
 
 // The number of the thread t in its launch.
 #define ITEM(t) ((i64)BLOCK * THREADS + (t))

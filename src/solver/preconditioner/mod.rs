@@ -56,10 +56,9 @@ pub trait Preconditioner {
     /// [`Self::prepare`] on the device of `system`, which is the tangent there; `None` if this preconditioner has no form for devices.
     fn prepare_on_device<'a>(
         &'a mut self,
-        tangent: &'a dyn Linearization,
-        system: &'a dyn OnDevice,
+        _tangent: &'a dyn Linearization,
+        _system: &'a dyn OnDevice,
     ) -> Option<Box<dyn LinearOperator<GpuVector> + 'a>> {
-        let _ = (tangent, system);
         None
     }
 }
