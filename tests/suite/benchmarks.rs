@@ -13,7 +13,7 @@ use std::process::Command;
 const SAME: f64 = 1e-6;
 
 /// Errors on the page have two digits, so they are rounded by at most a twentieth of themselves.
-const ROUNDED: f64 = 0.06;
+const ROUNDED: f64 = 0.05;
 
 /// A row of results: where, what bfree gives, and the known answer.
 struct Row {
