@@ -21,19 +21,28 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
+/// Compiles the emulated driver with the kernels of a folder.
+fn compile(kernels: &Path, folder: &Path) {
+    std::fs::create_dir_all(folder).unwrap();
+    let mut gcc = Command::new("gcc");
+    gcc.current_dir(root()).args(["-std=gnu11", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-DEMULATED"]);
+    // A product and a sum are rounded once, as by the library's lanes.
+    gcc.args(cfg!(target_arch = "x86_64").then_some("-mfma"));
+    gcc.arg("-I").arg(kernels).args(["tests/gpu/driver.c", "-x", "c"]).arg(kernels.join("kernels.cu"));
+    let made = gcc.arg("-o").arg(folder.join("libcuda.so")).output().unwrap();
+    assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
+}
+
+fn kernels() -> PathBuf {
+    root().join("src/gpu/kernels")
+}
+
 /// The folder of the emulated driver, which is compiled once.
 fn emulator() -> &'static Path {
     static FOLDER: OnceLock<PathBuf> = OnceLock::new();
     FOLDER.get_or_init(|| {
         let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("emulated-gpu-{}", std::process::id()));
-        std::fs::create_dir_all(&folder).unwrap();
-        let mut gcc = Command::new("gcc");
-        gcc.current_dir(root()).args(["-std=gnu11", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-DEMULATED"]);
-        // A product and a sum are rounded once, as by the library's lanes.
-        gcc.args(cfg!(target_arch = "x86_64").then_some("-mfma"));
-        gcc.args(["-I", "src/gpu/kernels", "tests/gpu/driver.c", "-x", "c", "src/gpu/kernels/kernels.cu", "-o"]);
-        let made = gcc.arg(folder.join("libcuda.so")).output().unwrap();
-        assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
+        compile(&kernels(), &folder);
         folder
     })
 }
@@ -285,13 +294,26 @@ fn a_gpu_that_fails_loses_nothing() -> Result<(), Failure> {
     Ok(())
 }
 
-/// The check of the tangent uses the product that runs.
+/// The check of the tangent uses the product that runs: it stops a run whose kernels have stresses that are a thousandth too large.
 #[test]
 fn the_tangent_check_sees_the_product_of_the_gpu() -> Result<(), Failure> {
     let directory = tempfile::tempdir()?;
-    let arguments = ["--steps", "2", "--gpu", "--check-tangent"];
-    let said = run(&mut emulated(bfree(), "forward"), "rebound.json", &directory.path().join("right"), &arguments)?;
+    let (wrong, arguments) = (directory.path().join("wrong"), ["--steps", "2", "--gpu", "--check-tangent"]);
+    std::fs::create_dir(&wrong)?;
+    for entry in std::fs::read_dir(kernels())? {
+        let path = entry?.path();
+        let text =
+            std::fs::read_to_string(&path)?.replace("double one = stress[i][k];", "double one = 1.001 * stress[i][k];");
+        std::fs::write(wrong.join(path.file_name().ok_or("a file without a name")?), text)?;
+    }
+    compile(&wrong, &wrong);
+    let mut right = emulated(bfree(), "forward");
+    let said = run(&mut right, "rebound.json", &directory.path().join("right"), &arguments)?;
     assert_eq!(said.0, Some(0), "{}", said.2);
+    let mut faulty = emulated(bfree(), "forward");
+    faulty.env("LD_LIBRARY_PATH", &wrong);
+    let said = run(&mut faulty, "rebound.json", &directory.path().join("faulty"), &arguments)?;
+    assert!(said.0 == Some(1) && said.2.contains("the tangent is wrong"), "{}", said.2);
     Ok(())
 }
 
