@@ -49,11 +49,14 @@ impl DeviceUse {
         } + if multigrid { 10 } else { 0 };
         // The form from which the levels are made stays on the processor.
         let levels = if multigrid { multigrid_bytes(nodes, D) - nodes * D.pow(4) * NUMBER } else { 0 };
+        // The filter of cubic functions: neighbours along each axis, scales, and three vectors.
+        let is_cubic = supports.extension().is_some_and(|extension| extension.degree() == 3);
+        let filter = if multigrid && is_cubic { nodes * D * (2 * size_of::<u32>() + 4 * NUMBER) } else { 0 };
         let followers = supports.extension().map_or(0, |extension| extension.bytes() + nodes * D * NUMBER);
         // The mask of prescribed values, diagonal blocks, and vectors.
         let nodal = nodes * D * (1 + D * NUMBER + NUMBER * vectors);
         let [functions, shared] = supports.device_bytes();
-        let bytes = functions + sets * (laws + cells) + masses + levels + followers + nodal;
+        let bytes = functions + sets * (laws + cells) + masses + levels + filter + followers + nodal;
         Ok(Self { bytes, shared })
     }
 
