@@ -3,6 +3,7 @@
 //!
 //! The block of `verification/race` with 8 cells³ particles runs on one thread. The times of all tasks are replayed for T threads: each task goes
 //! to the first free thread, and nothing else runs at the same time. The prediction knows no cost of waking threads, and no limit of the memory.
+//! Processes share the passes over the particles, and each of them does the rest of the work. Their speed-up is that of messages without cost.
 
 use bfree::parallel::{Region, record, threads};
 use bfree::scene::{self, Override};
@@ -47,6 +48,14 @@ fn main() -> Result<(), Box<dyn Error>> {
         let speed_ups: Vec<_> = [2, 4, 8, 16, 32, 64].map(|threads| format!("{:.2}", speed_up(threads))).into();
         let (share, regions_a_step) = (100.0 * outside / total, regions.len() / steps);
         println!("{name:15} {total:8.2} {share:7.2}% {regions_a_step:15}  {}", speed_ups.join(", "));
+        let passes: f64 = regions.iter().filter(|one| is_shared(one)).map(|one| one.tasks.iter().sum::<f64>()).sum();
+        let by_processes = [2.0, 4.0, 8.0].map(|count| format!("{:.2}", total / (total - passes + passes / count)));
+        println!(
+            "{:15} passes {:.1} %, speed-up with 2, 4, 8 processes at most {}",
+            "",
+            100.0 * passes / total,
+            by_processes.join(", ")
+        );
         if detail {
             print_regions(&regions);
             print_gaps(begin, end, &regions);
@@ -70,6 +79,11 @@ fn block(cells: usize, changes: &[&str]) -> Result<Simulation<3>, Box<dyn Error>
     }
     let scene = scene::read_file("scenes/block_static.json".as_ref(), &overrides)?;
     Ok(scene.build("scenes".as_ref())?)
+}
+
+/// Whether processes share the tasks of a region.
+fn is_shared(region: &Region) -> bool {
+    ["sweep/regions.rs", "sweep/tiled.rs"].iter().any(|file| region.place.file().ends_with(file))
 }
 
 /// Seconds that the tasks of a region take on `threads` threads.

@@ -115,6 +115,14 @@ pub(crate) fn widest(work: impl WithLanes) {
     work.run(PORTABLE);
 }
 
+/// Whether this processor rounds a product and a sum once.
+pub(crate) fn rounds_once() -> bool {
+    #[cfg(target_arch = "x86_64")]
+    return V3::try_new().is_some();
+    #[cfg(not(target_arch = "x86_64"))]
+    false
+}
+
 /// The name of the widest instructions of this processor. Those that round a product and a sum once give other bits than the others.
 pub(crate) fn instructions() -> &'static str {
     #[cfg(target_arch = "x86_64")]

@@ -38,7 +38,7 @@ pub struct Scratch {
 /// assert!(LmeCircle::new(3.0, 1e-6).separable().is_none());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub trait ShapeFunction: Validate + Send + Sync {
+pub trait ShapeFunction: Validate + Clone + Send + Sync + 'static {
     /// Whether scenes use this type. Their steps are compiled once, in this crate.
     #[doc(hidden)]
     const IN_SCENES: bool = false;
@@ -64,7 +64,7 @@ pub trait ShapeFunction: Validate + Send + Sync {
     }
 }
 
-impl<S: Separable> ShapeFunction for S {
+impl<S: Separable + Clone + 'static> ShapeFunction for S {
     #[inline]
     fn evaluate<const D: usize>(
         &self,

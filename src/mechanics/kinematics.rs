@@ -2,9 +2,11 @@
 //! the nodes. A scene with another kinematics would need another file than this one, and no other change of the terms.
 
 use crate::material::{MaterialState, NonPositiveJacobian};
+use crate::parallel::Message;
 use crate::particles::Particles;
 use crate::scalar::Real;
 use crate::tensor::{Tensor, identity, scaled};
+use std::slice::Iter;
 
 /// A particle with det F ≤ 0.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -14,6 +16,17 @@ pub struct Inadmissible {
     pub particle: usize,
     /// The determinant found.
     pub source: NonPositiveJacobian,
+}
+
+impl Message for Inadmissible {
+    fn put(&self, to: &mut Vec<f64>) {
+        (self.particle, self.source.det_f).put(to);
+    }
+
+    fn take(from: &mut Iter<'_, f64>) -> Self {
+        let (particle, det_f) = Message::take(from);
+        Self { particle, source: NonPositiveJacobian { det_f } }
+    }
 }
 
 /// H of F = ΔF F_r with ΔF = I + L: H = L + H_r + L H_r, which loses no digits (eq. 45).

@@ -58,7 +58,8 @@ impl<const D: usize> Tangent<'_, D> {
             let numbers: Vec<usize> = cells.into_iter().map(|cell| cell.add_to(&mut form, &mut places, D)).collect();
             slots.map(|slot| Some(numbers[slot?]))
         };
-        let cells = self.supports().map_groups(|group| self.cells_of(group)).into_iter().map(&mut number).collect();
+        let mut cells = Vec::with_capacity(self.supports().groups());
+        self.supports().each_group(|group| cells.push(number(self.cells_of(group))));
         form.finish_centres();
         let mut unit = At::<f64, D, D>::zero();
         unit.value[0] = [1.0; LANES];

@@ -10,6 +10,7 @@ use crate::approximation::{Approximation, Cells};
 use crate::clock::Clock;
 use crate::grid::Grid;
 use crate::mechanics::smoothing::Smoothing;
+use crate::parallel::Processes;
 use crate::particles::{self, Particles};
 use crate::shape::Shape;
 use crate::simulation::{Settings, Simulation, as_type};
@@ -202,6 +203,7 @@ impl Scene {
             error_tolerance: self.time.adaptive.map(|adaptive| adaptive.tolerance),
             check_tangent: None,
             gpu: None,
+            processes: Processes::default(),
             stop: None,
         }
     }

@@ -5,6 +5,7 @@ use crate::mechanics::reference::GridReset;
 use crate::mechanics::schemes::{Newmark, Scheme};
 use crate::mechanics::smoothing::Smoothing;
 use crate::mechanics::transfer::{Projection, WallUpdate};
+use crate::parallel::Processes;
 use crate::solver::{NewtonSettings, Preconditioning, Stop};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -57,6 +58,8 @@ pub struct Settings {
     pub check_tangent: Option<NonZeroU64>,
     /// The device on which linear systems are solved; `None` for the processor.
     pub gpu: Option<Arc<Gpu>>,
+    /// The processes that share the passes over the particles.
+    pub processes: Processes,
     /// A function that may stop a step early.
     pub stop: Option<Stop>,
 }
@@ -78,6 +81,7 @@ impl Default for Settings {
             error_tolerance: None,
             check_tangent: None,
             gpu: None,
+            processes: Processes::default(),
             stop: None,
         }
     }

@@ -40,7 +40,9 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     fn unaggregated(&self, spare: Option<Supports<D>>) -> Result<Supports<D>, SupportError> {
         let Self { particles, bodies, loads, approximation, grid, settings, workspace, .. } = self;
         let fields = Fields::of(bodies, &particles.body);
-        let mut points = Points { ids: Some(&particles.id), fields, ..Points::at(particles.reference().position) };
+        let processes = settings.processes.clone();
+        let mut points =
+            Points { ids: Some(&particles.id), fields, processes, ..Points::at(particles.reference().position) };
         if settings.aggregation {
             let at_surface = approximation.separable().map_or(AtSurface::Own, Separable::at_surface);
             points = at_surface_points(points, particles, loads, grid, at_surface);

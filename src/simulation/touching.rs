@@ -67,7 +67,9 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// The particles that contribute to nodes of another body, by pairs of bodies.
     fn interfaces(&self, supports: &Supports<D>) -> BTreeMap<[u32; 2], Interface> {
         let mut found: BTreeMap<[u32; 2], Interface> = BTreeMap::new();
-        if self.bodies.len() < 2 {
+        // Bodies of different fields share no nodes.
+        let fields: BTreeSet<u32> = self.bodies.iter().map(|body| body.field).collect();
+        if fields.len() == self.bodies.len() {
             return found;
         }
         let particles = &self.particles;

@@ -51,20 +51,20 @@ impl Nodes {
     /// From grid numbers in any order, with repetitions.
     pub fn new(mut ids: Vec<u64>) -> Self {
         ids.sort_unstable();
-        Self::of_bricks(ids.into_iter().map(|id| (id / BRICK, 1 << (id % BRICK))).collect())
+        Self::of_bricks(ids.into_iter().map(|id| [id / BRICK, 1 << (id % BRICK)]).collect())
     }
 
     /// From the numbers of bricks, in any order, each with bits for its active nodes. A brick may occur several times, with other nodes.
-    pub(crate) fn of_bricks(mut parts: Vec<(u64, u64)>) -> Self {
-        parts.sort_unstable_by_key(|&(number, _)| number);
+    pub(crate) fn of_bricks(mut parts: Vec<[u64; 2]>) -> Self {
+        parts.sort_unstable_by_key(|&[number, _]| number);
         let mut len = 0;
-        let brick = |same: &[(u64, u64)]| {
-            let active = same.iter().fold(0, |all, (_, active)| all | active);
-            let brick = Brick { number: same[0].0, active, first: len };
+        let brick = |same: &[[u64; 2]]| {
+            let active = same.iter().fold(0, |all, [_, active]| all | active);
+            let brick = Brick { number: same[0][0], active, first: len };
             len += active.count_ones();
             brick
         };
-        let bricks: Vec<Brick> = parts.chunk_by(|one, next| one.0 == next.0).map(brick).collect();
+        let bricks: Vec<Brick> = parts.chunk_by(|one, next| one[0] == next[0]).map(brick).collect();
         Self { bricks: Arc::new(bricks), len: len as usize }
     }
 

@@ -274,6 +274,7 @@ proptest! {
 }
 
 /// Cubic splines that claim the reach of quadratic splines.
+#[derive(Clone)]
 struct Understated;
 
 impl Validate for Understated {

@@ -91,6 +91,7 @@ impl<const D: usize> CellRows<D> {
                 }
             }
         });
+        supports.share_rows(layout.count, &mut rows);
         Self { cells, layout, rows: Arc::new(rows), stiffness, mixed: None }
     }
 
@@ -164,6 +165,7 @@ impl<const D: usize> CellRows<D> {
                 (0..LANES).for_each(|lane| grown[0][lane] += b[lane] * l[lane]);
             }
         });
+        supports.share_rows(1, &mut grown);
         self.cells.sums(&grown)
     }
 

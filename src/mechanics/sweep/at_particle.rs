@@ -1,10 +1,11 @@
 //! The results of a pass at the particles.
 
+use crate::parallel::Message;
 use nalgebra::SMatrix;
 use num_dual::Dual64;
 
 /// A result at one particle.
-pub trait AtParticle: Copy + Send {
+pub trait AtParticle: Copy + Send + Message {
     /// A value that fills an array before the results are written.
     fn blank() -> Self;
 }
@@ -27,7 +28,7 @@ impl AtParticle for bool {
     }
 }
 
-impl<T: nalgebra::Scalar + num_traits::Zero + Copy + Send, const R: usize, const C: usize> AtParticle
+impl<T: nalgebra::Scalar + num_traits::Zero + Copy + Send + Message, const R: usize, const C: usize> AtParticle
     for SMatrix<T, R, C>
 {
     fn blank() -> Self {

@@ -10,6 +10,8 @@ use crate::tensor::Vector;
 pub(super) struct Block {
     /// Number of its first group, over all blocks.
     pub(super) first: usize,
+    /// Number of its first particle, over all blocks.
+    pub(super) start: u32,
     pub(super) windows: Vec<Span>,
     /// Weights of the groups, one after the other, as in [`Window`].
     pub(super) weights: Vec<[f64; LANES]>,
@@ -51,6 +53,21 @@ impl Block {
     /// Number of particles.
     pub(super) fn count(&self) -> usize {
         self.windows.iter().map(|group| usize::from(group.lanes)).sum()
+    }
+
+    /// Number of particles of each group.
+    pub(super) fn lanes(&self) -> impl Iterator<Item = u8> {
+        self.windows.iter().map(|group| group.lanes)
+    }
+
+    /// Makes this the block of another process: groups of `particles` with these numbers of lanes, without shape functions and nodes.
+    pub(super) fn set_foreign(&mut self, field: u32, mut particles: impl Iterator<Item = u32>, lanes: &[u8]) {
+        *self = Self { field, size: [1; 3], ..Self::default() };
+        for &lanes in lanes {
+            self.windows.push(Span { weights: 0, first: 0, width: [0; 3], lanes });
+            let mut particle = |lane| if lane < usize::from(lanes) { particles.next() } else { None };
+            self.particles.push(std::array::from_fn(|lane| particle(lane).unwrap_or(u32::MAX)));
+        }
     }
 
     #[inline(always)]

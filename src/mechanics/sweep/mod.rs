@@ -32,6 +32,7 @@ mod blocks;
 mod builder;
 mod columns;
 mod fields;
+mod foreign;
 mod group;
 mod kernel;
 mod lattice;
@@ -44,6 +45,7 @@ mod passes;
 mod plain;
 mod points;
 mod regions;
+mod shares;
 mod supports;
 mod tiled;
 

@@ -2,7 +2,7 @@
 
 use super::block::Block;
 use crate::grid::{BRICK, Grid, brick_edge};
-use crate::parallel;
+use crate::parallel::{self, Processes};
 use crate::space::{Nodes, bits};
 use std::ops::Range;
 
@@ -39,20 +39,22 @@ fn parts<const D: usize>(grid: &Grid<D>, block: &Block) -> impl Iterator<Item = 
 }
 
 /// The bricks of a block, each with bits for its active nodes.
-fn bricks<const D: usize>(grid: &Grid<D>, block: &Block) -> Vec<(u64, u64)> {
-    let mut bricks: Vec<(u64, u64)> = Vec::new();
+fn bricks<const D: usize>(grid: &Grid<D>, block: &Block) -> Vec<[u64; 2]> {
+    let mut bricks: Vec<[u64; 2]> = Vec::new();
     for Part { brick, node, active, .. } in parts(grid, block) {
         match bricks.last_mut() {
-            Some((last, all)) if *last == brick => *all |= active << node,
-            _ => bricks.push((brick, active << node)),
+            Some([last, all]) if *last == brick => *all |= active << node,
+            _ => bricks.push([brick, active << node]),
         }
     }
     bricks
 }
 
-/// Numbers the active nodes in the order of the grid, and tells each block the numbers in its box.
-pub(super) fn number<const D: usize>(grid: &Grid<D>, blocks: &mut [Block]) -> Nodes {
-    let nodes = Nodes::of_bricks(parallel::map(blocks.len(), &|b| bricks(grid, &blocks[b])).concat());
+/// Numbers the active nodes of all processes in the order of the grid, and tells each block of this process the numbers in its box.
+pub(super) fn number<const D: usize>(grid: &Grid<D>, blocks: &mut [Block], processes: &Processes) -> Nodes {
+    let own = parallel::map(blocks.len(), &|b| bricks(grid, &blocks[b])).concat();
+    let (all, _) = processes.joined(own);
+    let nodes = Nodes::of_bricks(all);
     parallel::for_each(blocks.iter_mut(), &|block: &mut Block| {
         let (mut numbers, mut places) = (std::mem::take(&mut block.nodes), std::mem::take(&mut block.places));
         numbers.clear();

@@ -21,7 +21,7 @@ const RUN: usize = 4096;
 pub(super) struct Key {
     /// (field · blocks + block) · cells of a block + cell in the block
     pub(super) cell: u64,
-    id: u32,
+    pub(super) id: u32,
     /// Its index in memory.
     pub(super) particle: u32,
 }

@@ -4,7 +4,7 @@ use super::group::At;
 use super::supports::{Implementation, dispatch};
 use super::{AtParticle, Group, Mode, Number, Quadratic, Supports, Weights};
 use crate::lanes::LANES;
-use crate::parallel::First;
+use crate::parallel::{First, Message};
 use crate::pooled::{Element, Pooled};
 use crate::tensor::{Tensor, Vector};
 use std::convert::Infallible;
@@ -15,7 +15,7 @@ impl<const D: usize> Supports<D> {
     ///
     /// # Errors
     /// An error of `point` carries a number. The error with the smallest number is returned, and `out` is then unspecified.
-    pub fn sweep<T: Number, const C: usize, E: Send>(
+    pub fn sweep<T: Number, const C: usize, E: Send + Message>(
         &self,
         field: Option<&[Vector<T, C>]>,
         mode: Mode,
@@ -34,7 +34,7 @@ impl<const D: usize> Supports<D> {
         T::add_flat(out, |out| {
             dispatch!(self, one => one.sweep::<C>(T::FIELDS, field.as_deref(), mode, out, &point));
         });
-        failure.check()
+        failure.check(self.processes())
     }
 
     /// [`Self::sweep`] of a function that always has a value, such as a product with a tangent.
@@ -52,7 +52,8 @@ impl<const D: usize> Supports<D> {
         let Ok(()) = self.sweep(field, mode, out, point);
     }
 
-    /// Calls `fill(group, L, rows)` for every group. Each group has `count` rows of its own.
+    /// Calls `fill(group, L, rows)` for every group. Each group has `count` rows of its own. With several processes, each of them fills the rows
+    /// of its own groups.
     pub(crate) fn fill_rows(
         &self,
         field: &[Vector<f64, D>],
@@ -62,6 +63,13 @@ impl<const D: usize> Supports<D> {
     ) {
         self.pass();
         dispatch!(self, one => one.fill_rows(bytemuck::cast_slice(field), count, rows, &fill));
+    }
+
+    /// Tells all processes the rows that each of them has filled.
+    pub(crate) fn share_rows(&self, count: usize, rows: &mut [[f64; LANES]]) {
+        if let Implementation::Tiled(tiled) = &self.implementation {
+            tiled.share_rows(count, rows);
+        }
     }
 
     /// `out_I +=` Σ_p B_p(∇_r N_I, ∇_r N_I) + m_p N_I² I, the nodal diagonal blocks of quadratic forms. `quadratic` fills in the form of
@@ -109,7 +117,7 @@ impl<const D: usize> Supports<D> {
     ///
     /// # Errors
     /// The error of the first particle in memory whose `point` fails.
-    pub fn assemble<T: Number, E: Send>(
+    pub fn assemble<T: Number, E: Send + Message>(
         &self,
         field: &[Vector<T, D>],
         weights: Weights,
@@ -131,7 +139,7 @@ impl<const D: usize> Supports<D> {
                 }
             }
         });
-        failure.check()
+        failure.check(self.processes())
     }
 
     /// `out_I += Σ_p value(p) N_I`, for C components: 1 or D.
@@ -236,7 +244,7 @@ impl<const D: usize> Supports<D> {
     ///
     /// # Errors
     /// The error of the first particle in memory whose `point` fails.
-    pub fn interpolate<T: Number, R: AtParticle, E: Send>(
+    pub fn interpolate<T: Number, R: AtParticle, E: Send + Message>(
         &self,
         field: &[Vector<T, D>],
         point: impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> Result<R, E> + Sync,
@@ -248,7 +256,7 @@ impl<const D: usize> Supports<D> {
                 R::blank()
             })
         });
-        failure.check()?;
+        failure.check(self.processes())?;
         Ok(results)
     }
 }

@@ -2,6 +2,7 @@
 
 use super::fields::Fields;
 use crate::approximation::ApproximationError;
+use crate::parallel::Processes;
 use crate::tensor::Vector;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -19,12 +20,20 @@ pub struct Points<'a, const D: usize> {
     pub extrapolation: BTreeMap<u32, Vector<f64, D>>,
     /// The nodal fields of the particles.
     pub fields: Fields<'a>,
+    /// The processes that share the passes over the particles.
+    pub processes: Processes,
 }
 
 impl<'a, const D: usize> Points<'a, D> {
     /// The particles at `positions`, none of which is on a loaded surface.
     pub fn at(positions: &'a [Vector<f64, D>]) -> Self {
-        Self { positions: positions.into(), ids: None, extrapolation: BTreeMap::new(), fields: Fields::default() }
+        Self {
+            positions: positions.into(),
+            ids: None,
+            extrapolation: BTreeMap::new(),
+            fields: Fields::default(),
+            processes: Processes::default(),
+        }
     }
 
     /// The id of a particle, for messages.

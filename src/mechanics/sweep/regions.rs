@@ -8,10 +8,12 @@ use super::block::Block;
 use super::blocks::{Quadratic, ScatterBlocks, scatter_blocks};
 use super::group::{At, Group, Window};
 use super::kernel::{self, Gather, Scatter};
+use super::shares::Shares;
 use super::tiled::{RANGE, Tiled};
 use super::{Evaluate, Fill, Mode, Point};
 use crate::lanes::LANES;
-use crate::parallel;
+use crate::parallel::{self, Message};
+use crate::pooled::Pooled;
 use crate::tensor::Tensor;
 
 /// Below this number of groups, waking the threads costs more than the work.
@@ -34,7 +36,7 @@ impl<const D: usize> Tiled<D> {
     /// Bytes of the boxes of all blocks in the pass with most numbers a node: diagonal blocks of the tangent, or dual numbers.
     pub(super) fn box_bytes(&self) -> usize {
         let numbers = |block: &Block| block.box_nodes() * (D * D).max(2 * D) + 2 * LANES;
-        if self.in_parallel() { self.blocks.iter().map(numbers).sum::<usize>() * size_of::<f64>() } else { 0 }
+        if self.in_parallel() { self.own().iter().map(numbers).sum::<usize>() * size_of::<f64>() } else { 0 }
     }
 
     /// [`super::Supports::sweep`] for `fields` fields of C components side by side. Without a field nothing is gathered.
@@ -120,37 +122,73 @@ impl<const D: usize> Tiled<D> {
         work: &Work<'_, S>,
         add: &Add<'_>,
     ) {
-        let length = |block: &Block| block.box_nodes() * numbers + more;
-        if !self.in_parallel() {
-            let longest = self.blocks.iter().map(length).max().unwrap_or(0);
-            let (mut scratch, mut buffer) = (S::default(), vec![0.0; longest]);
-            for block in &self.blocks {
-                let buffer = &mut buffer[..length(block)];
-                buffer.fill(0.0);
-                work(block, &mut scratch, buffer);
-                add(block, buffer, 0, out);
+        let (own, length) = (self.own(), |block: &Block| block.box_nodes() * numbers + more);
+        let Some((first, shares)) = self.shared() else {
+            if self.in_parallel() {
+                let boxes = self.filled_boxes(length, work);
+                self.add_boxes(numbers, out, &boxed(own, length, &boxes), 0, add);
+            } else {
+                self.add_in_turn(length, out, work, add);
             }
             return;
+        };
+        let boxes = self.filled_boxes(length, work);
+        let boxes = boxed(own, length, &boxes);
+        let before = shares.at_interface(numbers, out);
+        self.add_boxes(numbers, out, &boxes, first, add);
+        shares.complete(numbers, (out, &before), &self.pool, &|block, node, entry| {
+            add(&self.blocks[block], boxes[block - first], node, entry);
+        });
+    }
+
+    /// The first block of this process and the shares, if several processes share the blocks.
+    fn shared(&self) -> Option<(usize, &Shares)> {
+        self.shares.as_deref().map(|(shares, _)| (shares.own().start, shares))
+    }
+
+    /// Fills the boxes of all own blocks in turn, and adds each at once.
+    fn add_in_turn<S: Default + Send>(
+        &self,
+        length: impl Fn(&Block) -> usize,
+        out: &mut [f64],
+        work: &Work<'_, S>,
+        add: &Add<'_>,
+    ) {
+        let longest = self.own().iter().map(&length).max().unwrap_or(0);
+        let (mut scratch, mut buffer) = (S::default(), vec![0.0; longest]);
+        for block in self.own() {
+            let buffer = &mut buffer[..length(block)];
+            buffer.fill(0.0);
+            work(block, &mut scratch, buffer);
+            add(block, buffer, 0, out);
         }
-        let mut boxes = self.pool.unspecified(self.blocks.iter().map(length).sum(), 0.0);
+    }
+
+    /// The boxes of all own blocks, one after the other.
+    fn filled_boxes<S: Default + Send>(&self, length: impl Fn(&Block) -> usize, work: &Work<'_, S>) -> Pooled<f64> {
+        let own = self.own();
+        let mut boxes = self.pool.unspecified(own.iter().map(&length).sum(), 0.0);
         let mut left = &mut boxes[..];
-        let parts = self.blocks.iter().filter_map(|block| Some((block, left.split_off_mut(..length(block))?)));
-        parallel::for_each_with(parts, &|scratch, (block, buffer)| {
+        let parts = own.iter().filter_map(|block| Some((block, left.split_off_mut(..length(block))?)));
+        parallel::for_each_with(parts, &|scratch, (block, buffer): (&Block, &mut [f64])| {
             buffer.fill(0.0);
             work(block, scratch, buffer);
         });
-        let mut left = &boxes[..];
-        let boxes: Vec<_> = self.blocks.iter().filter_map(|block| left.split_off(..length(block))).collect();
+        boxes
+    }
+
+    /// Adds the boxes of all own blocks, the first of which has the number `first`.
+    fn add_boxes(&self, numbers: usize, out: &mut [f64], boxes: &[&[f64]], first: usize, add: &Add<'_>) {
         let ranges = out.chunks_mut(RANGE * numbers).zip(&self.ranges).enumerate();
         parallel::for_each(ranges, &|(range, (out, blocks)): (usize, (&mut [f64], &Vec<u32>))| {
             let blocks = blocks.as_slice();
             mutant!("sweep: several threads leave out the first block of a range": blocks = &blocks[1..]);
-            blocks.iter().for_each(|&b| add(&self.blocks[b as usize], boxes[b as usize], range * RANGE, out));
+            blocks.iter().for_each(|&b| add(&self.blocks[b as usize], boxes[b as usize - first], range * RANGE, out));
         });
     }
 
     /// Calls `evaluate(group, u and L, results)` for every group, with the results of its particles. They lie in the order of the groups.
-    pub(super) fn gather<R: Send, const C: usize>(
+    pub(super) fn gather<R: Message + Send, const C: usize>(
         &self,
         fields: usize,
         field: &[f64],
@@ -165,24 +203,35 @@ impl<const D: usize> Tiled<D> {
             });
         };
         self.write(Block::count, results, &one);
+        self.share(Block::count, results);
+    }
+
+    /// Takes the results of other processes' blocks, which are `count(block)` in number.
+    fn share<R: Message>(&self, count: impl Fn(&Block) -> usize, results: &mut [R]) {
+        if let Some((_, shares)) = self.shared() {
+            shares.share_results(&self.blocks, count, results);
+        }
     }
 
     /// Writes `evaluate(group)` of every group, in the order of their numbers.
-    pub(super) fn map_groups<R: Send>(&self, evaluate: &(dyn Fn(Group<'_>) -> R + Sync), results: &mut [R]) {
+    pub(super) fn map_groups<R: Message + Send>(&self, evaluate: &(dyn Fn(Group<'_>) -> R + Sync), results: &mut [R]) {
         let one = |(): &mut (), block: &Block, results: &mut [R]| {
             results.iter_mut().enumerate().for_each(|(group, result)| *result = evaluate(block.group(group)));
         };
         self.write(Block::len, results, &one);
+        self.share(Block::len, results);
     }
 
-    /// Calls `write` for every block with its results, which are `count(block)` in number.
+    /// Calls `write` for every own block with its results, which are `count(block)` in number.
     fn write<S: Default + Send, R: Send>(
         &self,
         count: impl Fn(&Block) -> usize,
         mut results: &mut [R],
         write: &Write<'_, S, R>,
     ) {
-        let parts = self.blocks.iter().filter_map(|block| Some((block, results.split_off_mut(..count(block))?)));
+        let first = self.shared().map_or(0, |(first, _)| first);
+        results = &mut results[self.blocks[..first].iter().map(&count).sum()..];
+        let parts = self.own().iter().filter_map(|block| Some((block, results.split_off_mut(..count(block))?)));
         if self.in_parallel() {
             parallel::for_each_with(parts, &|scratch, (block, results)| write(scratch, block, results));
         } else {
@@ -201,6 +250,16 @@ impl<const D: usize> Tiled<D> {
         };
         self.write(|block| block.len() * count, rows, &one);
     }
+
+    /// Tells all processes the rows that they have filled, `count` for each group.
+    pub(super) fn share_rows(&self, count: usize, rows: &mut [[f64; LANES]]) {
+        self.share(|block| block.len() * count, rows);
+    }
+}
+
+/// The box of each block.
+fn boxed<'b>(blocks: &[Block], length: impl Fn(&Block) -> usize, mut left: &'b [f64]) -> Vec<&'b [f64]> {
+    blocks.iter().filter_map(|block| left.split_off(..length(block))).collect()
 }
 
 /// Working memory of one thread.

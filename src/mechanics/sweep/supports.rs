@@ -4,15 +4,18 @@ use super::columns::WIDEST;
 use super::group::Group;
 use super::plain::Plain;
 use super::points::{Points, SupportError};
+use super::shares;
 use super::tiled::Tiled;
 use crate::aggregation::Extension;
 use crate::approximation::ShapeFunction;
 use crate::gpu::{Gpu, Masses, Transfer};
 use crate::grid::Grid;
+use crate::parallel::{Message, Processes};
 use crate::pooled::{Element, Pool, Pooled};
 use crate::scalar::Real;
 use crate::space::{Nodes, Space};
 use crate::tensor::{Tensor, Vector};
+use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
 
@@ -310,10 +313,46 @@ impl<const D: usize> Supports<D> {
     }
 
     /// `evaluate(group)` of all groups, in the order of their numbers.
-    pub(crate) fn map_groups<R: Clone + Default + Send>(&self, evaluate: impl Fn(Group<'_>) -> R + Sync) -> Vec<R> {
+    pub(crate) fn map_groups<R: Clone + Default + Send + Message>(
+        &self,
+        evaluate: impl Fn(Group<'_>) -> R + Sync,
+    ) -> Vec<R> {
         let mut results = vec![R::default(); self.groups()];
         dispatch!(self, one => one.map_groups(&evaluate, &mut results));
         results
+    }
+
+    /// The processes that share the passes.
+    pub(crate) fn processes(&self) -> &Processes {
+        match &self.implementation {
+            // The plain loop is not shared: every process runs the whole loop.
+            Implementation::Plain(_) => const { &Processes::ALONE },
+            Implementation::Tiled(tiled) => tiled.processes(),
+        }
+    }
+
+    /// The particles of this process by their index in memory, if particles lie in the order of the blocks; otherwise all particles.
+    pub(crate) fn own_particles(&self) -> Range<usize> {
+        match &self.implementation {
+            Implementation::Plain(plain) => 0..plain.particles(),
+            Implementation::Tiled(tiled) => tiled.own_particles(),
+        }
+    }
+
+    /// Each process has written `count` numbers for each of its [own particles](Self::own_particles). Fills in the numbers of the others.
+    pub(crate) fn share_particles(&self, count: usize, numbers: &mut [f64]) {
+        if let Implementation::Tiled(tiled) = &self.implementation {
+            tiled.share_particles(count, numbers);
+        }
+    }
+
+    /// The largest number of particles of a process, and the most entries of nodes that a process tells after a scatter, if so many processes
+    /// share the passes. The plain loop is not shared.
+    pub(crate) fn largest_shares(&self, processes: usize) -> [usize; 2] {
+        match &self.implementation {
+            Implementation::Plain(plain) => [plain.particles(), 0],
+            Implementation::Tiled(tiled) => shares::largest(processes, &tiled.blocks, self.nodes.len()),
+        }
     }
 
     /// Number of groups.

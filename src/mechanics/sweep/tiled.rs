@@ -6,18 +6,20 @@
 use super::block::Block;
 use super::builder::Builder;
 use super::columns::Family;
+use super::foreign::Foreign;
 use super::group::Group;
 use super::numbering::number;
 use super::order::{self, Key};
 use super::points::{Points, SupportError};
+use super::shares::Shares;
 use crate::approximation::{ApproximationError, Scratch, Separable, ShapeFunction, Support};
 use crate::grid::Grid;
 use crate::lanes::LANES;
-use crate::parallel;
-use crate::parallel::First;
+use crate::parallel::{self, First, Processes};
 use crate::pooled::Pool;
 use crate::space::Nodes;
 use crate::tensor::Vector;
+use std::ops::Range;
 
 /// Number of nodes in a range, over which one task adds the boxes of the blocks.
 pub(super) const RANGE: usize = 256;
@@ -37,6 +39,8 @@ pub(super) struct Tiled<const D: usize> {
     /// Whether the particles lie in memory in this order.
     pub(super) is_memory_order: bool,
     nodes: Nodes,
+    /// The processes that share the blocks, and the blocks of the others; `None` if there is one process.
+    pub(super) shares: Option<Box<(Shares, Foreign)>>,
 }
 
 impl<const D: usize> Tiled<D> {
@@ -50,6 +54,7 @@ impl<const D: usize> Tiled<D> {
         pool: &Pool,
     ) -> Result<(Self, Nodes), SupportError> {
         let positions = &*points.positions;
+        let outside = || ApproximationError::Outside { position: Vec::new(), lower: Vec::new(), upper: Vec::new() };
         // Threads meet errors in any order. So the particle with the smallest id is searched, with the error for its whole position.
         let failure = |particle: usize, source: ApproximationError| {
             let (mut scratch, mut support) = (Scratch::default(), Support::default());
@@ -59,35 +64,81 @@ impl<const D: usize> Tiled<D> {
             SupportError { particle, source }
         };
         let Self { mut blocks, mut ranges, slots, keys, .. } = reused.unwrap_or_default();
-        let keys = order::sorted(grid, points, keys).map_err(|particle| {
-            let outside = ApproximationError::Outside { position: Vec::new(), lower: Vec::new(), upper: Vec::new() };
-            failure(particle, outside)
-        })?;
-        let runs = || keys.chunk_by(|a, b| order::block::<D>(a) == order::block::<D>(b));
-        blocks.resize_with(runs().count(), Block::default);
+        let keys = order::sorted(grid, points, keys).map_err(|particle| failure(particle, outside()))?;
+        let runs: Vec<&[Key]> = keys.chunk_by(|a, b| order::block::<D>(a) == order::block::<D>(b)).collect();
+        blocks.resize_with(runs.len(), Block::default);
+        let processes = &points.processes;
+        let mut shares = processes.are_several().then(|| {
+            let counts: Vec<usize> = runs.iter().map(|run| run.len()).collect();
+            let foreign = Foreign::new(approximation, grid, points, &keys, runs.len());
+            Box::new((Shares::new(processes, &counts), foreign))
+        });
+        let own = own(&shares, runs.len());
         let (builder, failed) = (Builder { family: Family::new(product), grid, points }, First::none());
-        parallel::for_each_with(blocks.iter_mut().zip(runs()), &|scratch, (block, keys)| {
+        let parts = blocks[own.clone()].iter_mut().zip(&runs[own.clone()]);
+        parallel::for_each_with(parts, &|scratch, (block, keys): (&mut Block, &&[Key])| {
             if let Err(error) = builder.build(keys, block, scratch) {
-                failed.keep(keys[0].particle as usize, (keys[0].particle as usize, error));
+                failed.keep(keys[0].particle as usize, error);
             }
         });
-        failed.check().map_err(|(particle, error)| failure(particle, error))?;
-        let mut first = 0;
-        for block in &mut blocks {
-            block.first = first;
-            first += block.len();
+        let failed = failed.here();
+        if processes.any(failed.is_some()) {
+            let (particle, error) = failed.unwrap_or((0, outside()));
+            return Err(failure(particle, error));
         }
-        let nodes = number(grid, &mut blocks);
-        list_blocks(&blocks, nodes.len(), &mut ranges);
+        if let Some((shares, _)) = shares.as_deref() {
+            shares.tell_groups(&mut blocks, |block, number, lanes| {
+                let particles = runs[number].iter().map(|key| key.particle);
+                block.set_foreign(points.fields.field(runs[number][0].particle as usize), particles, lanes);
+            });
+        }
+        let (mut first, mut start) = (0, 0);
+        for block in &mut blocks {
+            (block.first, block.start) = (first, start);
+            first += block.len();
+            start += block.count() as u32;
+        }
+        let nodes = number(grid, &mut blocks[own.clone()], processes);
+        list_blocks(&blocks[own.clone()], own.start, nodes.len(), &mut ranges);
+        if let Some((shares, _)) = shares.as_deref_mut() {
+            shares.find_nodes(&blocks, nodes.len());
+        }
         let is_memory_order = keys.iter().zip(0..).all(|(key, place)| key.particle == place);
         let (pool, numbered) = (pool.clone(), nodes.clone());
-        let mut tiled = Self { blocks, ranges, pool, slots, keys, is_memory_order, nodes: numbered };
+        let mut tiled = Self { blocks, ranges, pool, slots, keys, is_memory_order, nodes: numbered, shares };
         tiled.find_slots();
         Ok((tiled, nodes))
     }
 
     pub(super) fn particles(&self) -> usize {
         self.slots.len()
+    }
+
+    /// The processes that share the blocks.
+    pub(super) fn processes(&self) -> &Processes {
+        self.shares.as_ref().map_or(const { &Processes::ALONE }, |both| &both.0.processes)
+    }
+
+    /// The blocks of this process.
+    pub(super) fn own(&self) -> &[Block] {
+        &self.blocks[own(&self.shares, self.blocks.len())]
+    }
+
+    /// See [`super::Supports::own_particles`].
+    pub(super) fn own_particles(&self) -> Range<usize> {
+        let own = self.own();
+        match own.first().filter(|_| self.is_memory_order) {
+            Some(first) => first.start as usize..first.start as usize + own.iter().map(Block::count).sum::<usize>(),
+            None if self.is_memory_order => 0..0,
+            None => 0..self.particles(),
+        }
+    }
+
+    /// See [`super::Supports::share_particles`].
+    pub(super) fn share_particles(&self, count: usize, numbers: &mut [f64]) {
+        if let Some((shares, _)) = self.shares.as_deref().filter(|_| self.is_memory_order) {
+            shares.share_results(&self.blocks, |block| block.count() * count, numbers);
+        }
     }
 
     /// The particles, block by block and group by group.
@@ -141,7 +192,7 @@ impl<const D: usize> Tiled<D> {
     }
 
     pub(super) fn windows(&self) -> Vec<([usize; 3], usize)> {
-        let groups = self.blocks.iter().flat_map(|block| &block.windows);
+        let groups = self.own().iter().flat_map(|block| &block.windows);
         groups.map(|group| (group.width.map(usize::from), usize::from(group.lanes))).collect()
     }
 
@@ -153,7 +204,14 @@ impl<const D: usize> Tiled<D> {
     pub(super) fn of(&self, grid: &Grid<D>, particle: usize) -> Vec<(usize, f64, Vector<f64, D>)> {
         let slot = self.slots[particle] as usize;
         let (group, lane) = (slot / LANES, slot % LANES);
-        let block = &self.blocks[self.blocks.partition_point(|block| block.first <= group) - 1];
+        let number = self.blocks.partition_point(|block| block.first <= group) - 1;
+        let mut block = &self.blocks[number];
+        if let Some((shares, foreign)) = self.shares.as_deref()
+            && !shares.own().contains(&number)
+        {
+            let start = block.start as usize;
+            block = foreign.block(number, &self.keys[start..start + block.count()], block);
+        }
         let active = |(place, n, grad_n): (usize, f64, _)| {
             Some((self.nodes.number(grid.id_in(block.field, block.index(place)))?, n, grad_n))
         };
@@ -161,11 +219,16 @@ impl<const D: usize> Tiled<D> {
     }
 }
 
-/// Lists the blocks of each range of nodes. The memory of `ranges` is reused.
-fn list_blocks(blocks: &[Block], nodes: usize, ranges: &mut Vec<Vec<u32>>) {
+/// The blocks of this process, of so many blocks in all.
+fn own(shares: &Option<Box<(Shares, Foreign)>>, count: usize) -> Range<usize> {
+    shares.as_ref().map_or(0..count, |both| both.0.own())
+}
+
+/// Lists the blocks of each range of nodes. The memory of `ranges` is reused. `first` is the number of the first block.
+fn list_blocks(blocks: &[Block], first: usize, nodes: usize, ranges: &mut Vec<Vec<u32>>) {
     ranges.resize_with(nodes.div_ceil(RANGE), Vec::new);
     ranges.iter_mut().for_each(Vec::clear);
-    for (block, number) in blocks.iter().zip(0..) {
+    for (block, number) in blocks.iter().zip(first as u32..) {
         for same in block.nodes.chunk_by(|&a, &b| a as usize / RANGE == b as usize / RANGE) {
             ranges[same[0] as usize / RANGE].push(number);
         }

@@ -39,7 +39,7 @@ impl<'a, const D: usize, L: Law> Stress<'a, D, L> {
                 failure.keep(error.particle, error);
             }
         });
-        failure.check()?;
+        failure.check(self.supports.processes())?;
         Ok(StressRows::new(form, rows))
     }
 }

@@ -304,23 +304,25 @@ impl<'a, const D: usize> Update<'a, D> {
                 let energy = if law.has_potential() { law.energy(&at.in_step(0.0, next)) } else { 0.0 };
                 let is_defined = det_f > 0.0 && energy.is_finite() && next.iter().all(|one| one.is_finite());
                 if !is_defined && particles.is_solid(p) {
-                    undefined.keep(particles.id[p] as usize, particles.id[p] as usize);
+                    undefined.keep(particles.id[p] as usize, ());
                 }
             };
-            let mut left = &mut next[..];
-            let part = |part: usize| {
-                let particles = part * PART..particles.len().min((part + 1) * PART);
+            let own = supports.own_particles();
+            let mut left = &mut next[own.start * variable_count..];
+            let part = |first: usize| {
+                let particles = first..own.end.min(first + PART);
                 Some((particles.clone(), left.split_off_mut(..particles.len() * variable_count)?))
             };
-            let parts = (0..particles.len().div_ceil(PART)).filter_map(part);
+            let parts = own.clone().step_by(PART).filter_map(part);
             parallel::for_each(parts, &|(particles, mut next): (Range<usize>, &mut [f64])| {
                 for p in particles {
                     next.split_off_mut(..variable_count).into_iter().for_each(|next| update(p, next));
                 }
             });
+            supports.share_particles(variable_count, &mut next);
         }
         self.memory = Some(next);
-        undefined.check().err()
+        undefined.anywhere(supports.processes()).map(|(particle, ())| particle)
     }
 
     /// Writes the new state to the particles, once per step. No other code of a step changes positions, deformations or internal variables.

@@ -17,6 +17,7 @@ enum Fault {
 }
 
 /// A shape function with a fault.
+#[derive(Clone)]
 struct Wrong(Fault);
 
 impl Validate for Wrong {

@@ -1,0 +1,259 @@
+//! Work on all cores and in several [processes](Processes), in an order that does not depend on their number.
+//!
+//! Threads receive tasks as `dyn Fn`. Their code is therefore compiled once for each type of parts, and not for every kind of work.
+//!
+//! Shared work is a list of tasks, here called a *region*. The time outside of regions limits the speed-up by threads. [`record`] measures both.
+
+mod as_threads;
+mod mpi;
+mod processes;
+
+pub use mpi::MpiError;
+pub use processes::{Exchange, Message, Processes};
+
+use rayon::prelude::*;
+use std::cell::RefCell;
+use std::panic::Location;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+
+/// The most threads of a run.
+pub(crate) const MOST_THREADS: u64 = 1024;
+
+/// Sets the number of threads. Without this call there are as many threads as cores.
+///
+/// # Errors
+/// The threads cannot be started, or their number was set before.
+pub(crate) fn use_threads(count: usize) -> Result<(), rayon::ThreadPoolBuildError> {
+    rayon::ThreadPoolBuilder::new().num_threads(count).build_global()
+}
+
+/// The number of threads.
+pub fn threads() -> usize {
+    rayon::current_num_threads()
+}
+
+/// Whether there is more than one thread. While regions are recorded, the answer is yes.
+pub(crate) fn several() -> bool {
+    threads() > 1 || records()
+}
+
+/// A region that ran in [`record`]: one call of a function of this file.
+#[derive(Clone, Debug)]
+pub struct Region {
+    /// The line that shares the work.
+    pub place: &'static Location<'static>,
+    /// The beginning.
+    pub begin: Instant,
+    /// The end.
+    pub end: Instant,
+    /// Seconds of each task.
+    pub tasks: Vec<f64>,
+}
+
+thread_local! {
+    /// The regions that this thread has recorded, while it records.
+    static REGIONS: RefCell<Option<Vec<Region>>> = const { RefCell::new(None) };
+}
+
+fn records() -> bool {
+    REGIONS.with_borrow(Option::is_some)
+}
+
+/// Runs `f` with the tasks of every region one after the other, and measures them. Results have the same bits as with any number of threads.
+/// Only regions that this thread shares are recorded. A region inside a task belongs to that task.
+///
+/// ```
+/// let mut simulation = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?.build::<2>("scenes".as_ref())?;
+/// let (step, regions) = bfree::parallel::record(|| simulation.step());
+/// assert!(step?.newton.history.iterations.len() > 1);
+/// assert!(regions.iter().all(|region| region.tasks.iter().sum::<f64>() <= (region.end - region.begin).as_secs_f64()));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn record<R>(f: impl FnOnce() -> R) -> (R, Vec<Region>) {
+    REGIONS.set(Some(Vec::new()));
+    let result = f();
+    (result, REGIONS.take().unwrap_or_default())
+}
+
+/// Calls `task(0)`, …, `task(count − 1)`, each on any free thread. This is the only call of the pool, so its code is compiled once.
+fn run(place: &'static Location<'static>, count: usize, task: &(dyn Fn(usize) + Sync)) {
+    if records() {
+        record_region(place, count, task);
+    } else if count > 1 {
+        (0..count).into_par_iter().for_each(task);
+    } else {
+        (0..count).for_each(task);
+    }
+}
+
+/// Calls all tasks in order, and records the times.
+fn record_region(place: &'static Location<'static>, count: usize, task: &(dyn Fn(usize) + Sync)) {
+    let before = REGIONS.take();
+    let begin = Instant::now();
+    let mut last = begin;
+    let tasks = (0..count).map(|number| {
+        task(number);
+        let before = std::mem::replace(&mut last, Instant::now());
+        (last - before).as_secs_f64()
+    });
+    let tasks = tasks.collect();
+    let mut regions = before.unwrap_or_default();
+    regions.push(Region { place, begin, end: last, tasks });
+    REGIONS.set(Some(regions));
+}
+
+/// Runs `f` on a thread of the pool. Shared work begins there at once. On any other thread, every piece of shared work first wakes a thread of the
+/// pool, and at its end that thread wakes the caller.
+///
+/// A function that must run on its own thread does not belong here: Python's check for Ctrl-C, for example. The pool does not survive `fork`.
+///
+/// ```
+/// use bfree::parallel::in_pool;
+///
+/// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+/// let mut simulation = scene.build::<2>("scenes".as_ref())?;
+/// assert!(in_pool(|| simulation.advance())?.newton.history.iterations.len() > 1);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn in_pool<R: Send>(f: impl FnOnce() -> R + Send) -> R {
+    rayon::scope(|_| f())
+}
+
+/// Runs `f` with this number of threads.
+#[cfg(test)]
+pub(crate) fn with_threads<R: Send>(count: usize, f: impl FnOnce() -> R + Send) -> R {
+    rayon::ThreadPoolBuilder::new().num_threads(count).build().unwrap().install(f)
+}
+
+/// Locks a mutex. The data stays usable after a thread panicked while it held the lock.
+pub(crate) fn held<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Calls `f(part)` for every part, each on any free thread.
+#[track_caller]
+pub(crate) fn for_each<P: Send>(parts: impl Iterator<Item = P>, f: &(dyn Fn(P) + Sync)) {
+    collect(parts, f);
+}
+
+/// [`for_each`] with scratch space, which is reused from part to part.
+#[track_caller]
+pub(crate) fn for_each_with<P: Send, S: Send + Default>(
+    parts: impl Iterator<Item = P>,
+    f: &(dyn Fn(&mut S, P) + Sync),
+) {
+    let spare = Mutex::new(Vec::new());
+    for_each(parts, &|part| {
+        let scratch = held(&spare).pop();
+        let mut scratch = scratch.unwrap_or_default();
+        f(&mut scratch, part);
+        held(&spare).push(scratch);
+    });
+}
+
+/// `f(0)`, …, `f(count − 1)`.
+#[track_caller]
+pub(crate) fn map<R: Send>(count: usize, f: &(dyn Fn(usize) -> R + Sync)) -> Vec<R> {
+    collect(0..count, f)
+}
+
+/// `f(part)` of every part.
+#[track_caller]
+pub(crate) fn collect<P: Send, R: Send>(parts: impl Iterator<Item = P>, f: &(dyn Fn(P) -> R + Sync)) -> Vec<R> {
+    if !several() {
+        return parts.map(f).collect();
+    }
+    // A part, and then its result. Each is locked once.
+    let tasks: Vec<_> = parts.map(|part| Mutex::new((Some(part), None))).collect();
+    run(Location::caller(), tasks.len(), &|number| {
+        let mut task = held(&tasks[number]);
+        task.1 = task.0.take().map(f);
+    });
+    tasks.into_iter().filter_map(|task| task.into_inner().unwrap_or_else(PoisonError::into_inner).1).collect()
+}
+
+/// Particles or nodes in one task of a pass over arrays.
+pub(crate) const PART: usize = 2048;
+
+/// `f(x, y)` for all pairs of elements.
+#[track_caller]
+pub(crate) fn zip<X: Send, Y: Sync>(x: &mut [X], y: &[Y], f: impl Fn(&mut X, &Y) + Sync) {
+    for_each(x.chunks_mut(PART).zip(y.chunks(PART)), &|(x, y): (&mut [X], &[Y])| {
+        x.iter_mut().zip(y).for_each(|(x, y)| f(x, y));
+    });
+}
+
+/// Sorts by the keys, all of which differ.
+pub(crate) fn sort<K: Ord + Send>(keys: &mut [K]) {
+    keys.par_sort_unstable();
+}
+
+/// The failure with the smallest number, whichever threads and processes failed.
+pub(crate) struct First<E>(Mutex<Option<(usize, E)>>);
+
+impl<E> First<E> {
+    pub(crate) fn none() -> Self {
+        Self(Mutex::new(None))
+    }
+
+    pub(crate) fn keep(&self, number: usize, error: E) {
+        let mut first = held(&self.0);
+        if first.as_ref().is_none_or(|(before, _)| number < *before) {
+            *first = Some((number, error));
+        }
+    }
+
+    /// The failure with the smallest number in this process, and this number.
+    pub(crate) fn here(self) -> Option<(usize, E)> {
+        self.0.into_inner().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The failure with the smallest number of all processes, and this number.
+    pub(crate) fn anywhere(self, processes: &Processes) -> Option<(usize, E)>
+    where
+        E: Message,
+    {
+        let own = self.here();
+        let all = if E::NEVER { vec![own] } else { processes.told(&own) };
+        all.into_iter().flatten().min_by_key(|(number, _)| *number)
+    }
+
+    /// # Errors
+    /// The failure with the smallest number of all processes.
+    pub(crate) fn check(self, processes: &Processes) -> Result<(), E>
+    where
+        E: Message,
+    {
+        self.anywhere(processes).map_or(Ok(()), |(_, error)| Err(error))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn work_in_the_pool_runs_on_one_of_its_threads() {
+        assert_eq!(rayon::current_thread_index(), None);
+        let [outer, inner] = in_pool(|| [rayon::current_thread_index(), in_pool(rayon::current_thread_index)]);
+        assert!(outer.is_some() && inner == outer, "{outer:?}, {inner:?}");
+    }
+
+    #[test]
+    fn everything_is_done_once_and_in_its_place() {
+        for threads in [1, 3] {
+            with_threads(threads, || {
+                assert_eq!(several(), threads > 1);
+                assert_eq!(map(1000, &|k| 3 * k), (0..1000).map(|k| 3 * k).collect::<Vec<_>>());
+                let mut numbers = vec![0; 1000];
+                for_each_with(numbers.chunks_mut(7).enumerate(), &|scratch: &mut Vec<usize>, (k, part)| {
+                    scratch.clear();
+                    scratch.extend((0..part.len()).map(|i| 7 * k + i));
+                    part.iter_mut().zip(scratch).for_each(|(number, &mut i)| *number += i);
+                });
+                assert!(numbers.iter().enumerate().all(|(i, &number)| i == number));
+            });
+        }
+    }
+}
