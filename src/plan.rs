@@ -1,9 +1,11 @@
 //! The requirements of a scene: the terms in use and why, the number of unknowns, and the memory of each array.
 
 mod arrays;
+mod of_processes;
 mod on_gpu;
 
 pub use arrays::ArrayUse;
+pub use of_processes::ProcessUse;
 pub use on_gpu::DeviceUse;
 
 use crate::approximation::ShapeFunction;

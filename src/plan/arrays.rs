@@ -23,6 +23,8 @@ pub struct ArrayUse {
     pub name: &'static str,
     /// Bytes.
     pub bytes: u64,
+    /// Whether each of several processes has a part of the array. It has all others whole.
+    pub is_shared: bool,
 }
 
 /// The arrays that a run of a simulation has.
@@ -40,9 +42,10 @@ pub(super) fn arrays<const D: usize, L: Law, A: ShapeFunction>(
         has_inertia: simulation.settings.scheme.has_inertia(),
         keeps_grid: simulation.settings.grid_reset != GridReset::EveryStep,
     };
-    let all = [inventory.particle_data(), inventory.nodal_data(), inventory.linear_systems()].concat();
-    let used = all.into_iter().filter(|(used, ..)| *used);
-    used.map(|(_, name, bytes)| ArrayUse { name, bytes: bytes as u64 }).collect()
+    let whole = [inventory.particle_data(), inventory.nodal_data(), inventory.linear_systems()].concat();
+    let shared = inventory.passes().into_iter().map(|row| (row, supports.is_tiled()));
+    let used = shared.chain(whole.into_iter().map(|row| (row, false))).filter(|((used, ..), _)| *used);
+    used.map(|((_, name, bytes), is_shared)| ArrayUse { name, bytes: bytes as u64, is_shared }).collect()
 }
 
 /// Whether a run has the array, the name of the array, and its bytes.
@@ -69,6 +72,18 @@ impl<const D: usize, L: Law, A: ShapeFunction> Inventory<'_, D, L, A> {
     const VECTOR: usize = size_of::<Vector<f64, D>>();
     const TENSOR: usize = size_of::<Tensor<f64, D>>();
 
+    /// The arrays of the passes over the particles.
+    fn passes(&self) -> Vec<Row> {
+        let (simulation, supports) = (self.simulation, self.supports);
+        let linearized =
+            tangent_bytes(&simulation.particles, &simulation.bodies, supports, simulation.has_mean_stress());
+        vec![
+            (true, "shape functions: N, dN/dx by axis", supports.bytes()),
+            (true, "linearized tangent", linearized),
+            (supports.box_bytes() > 0, "boxes of nodes, one for each block of cells", supports.box_bytes()),
+        ]
+    }
+
     fn particle_data(&self) -> Vec<Row> {
         let (settings, count) = (&self.simulation.settings, self.particles);
         let variable_count = self.simulation.particles.variable_count;
@@ -85,7 +100,6 @@ impl<const D: usize, L: Law, A: ShapeFunction> Inventory<'_, D, L, A> {
             // The part of the field that nodes cannot represent, its change, and the change of the other field.
             (smooths, "particles: smoothing", count * 3 * Self::VECTOR),
             (fits, "affine fits of v, a", fit_bytes),
-            (true, "shape functions: N, dN/dx by axis", self.supports.bytes()),
             (self.supports.is_tiled(), "particles: the order of the sweep", count * 2 * size_of::<u64>()),
         ]
     }
@@ -127,8 +141,6 @@ impl<const D: usize, L: Law, A: ShapeFunction> Inventory<'_, D, L, A> {
 
     fn linear_systems(&self) -> Vec<Row> {
         let (nodes, simulation, supports) = (self.nodes, self.simulation, self.supports);
-        let linearized =
-            tangent_bytes(&simulation.particles, &simulation.bodies, supports, simulation.has_mean_stress());
         let averages = simulation.bodies.iter().any(Body::averages);
         // θ, and on a kept grid θ at the last reset; the cell, and the result of a loop over particles there.
         let dilatation_bytes = Cells::BYTES + NUMBER * if self.keeps_grid { 4 } else { 3 };
@@ -143,10 +155,8 @@ impl<const D: usize, L: Law, A: ShapeFunction> Inventory<'_, D, L, A> {
             Krylov::Automatic | Krylov::ConjugateGradient => 7,
         };
         vec![
-            (true, "linearized tangent", linearized),
             (averages, "particles: mean dilatation", self.particles * dilatation_bytes),
             (averages, "linearized tangent: mean dilatation", linearized_dilatation),
-            (supports.box_bytes() > 0, "boxes of nodes, one for each block of cells", supports.box_bytes()),
             (true, "preconditioner: diagonal blocks", nodes * Self::TENSOR),
             (followers > 0, "nodes that follow others, and their weights", followers),
             (multigrid, "preconditioner: multigrid levels", multigrid_bytes(nodes, D)),

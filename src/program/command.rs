@@ -1,12 +1,12 @@
 //! The command line: chooses the command, and turns its result into an exit code.
 
 use super::check_law::CheckLaw;
-use super::failure::{Failure, INTERRUPTED, print, tell};
+use super::failure::{Failure, print, tell};
 use super::new::New;
 use super::newton::Newton;
 use super::pack::pack;
 use super::reproduce::Reproduce;
-use super::run::Run;
+use super::run::{Run, whole};
 use super::scene_arguments::SceneArguments;
 use crate::causes;
 use crate::output::OutputError;
@@ -36,6 +36,9 @@ enum Command {
         /// Say also whether the scene runs on the GPU of this machine, and how much of its memory it takes.
         #[arg(long)]
         gpu: bool,
+        /// Say also what each of this many processes of MPI would hold, and tell the others.
+        #[arg(long, value_name = "N", value_parser = whole(1, 100_000))]
+        ranks: Option<u64>,
     },
     /// Write a starter scene and explain its keys. Without a problem, list the problems.
     New(New),
@@ -89,7 +92,7 @@ pub fn main() -> ExitCode {
     let json = matches!(&command, Command::Run(run) if run.tells_json());
     let result = match command {
         Command::Run(run) => run.execute(),
-        Command::Check { scene, gpu } => scene.check(gpu),
+        Command::Check { scene, gpu, ranks } => scene.check(gpu, ranks),
         Command::New(new) => new.execute(),
         Command::CheckLaw(check) => check.execute(),
         Command::Newton(newton) => newton.execute(),
@@ -102,13 +105,9 @@ pub fn main() -> ExitCode {
         Command::Pack { directory } => pack(&directory),
         Command::Schema => serde_json::to_string_pretty(&scene::schema()).map_err(Failure::run).and_then(print),
     };
-    let (error, code) = match result {
-        Ok(()) => return ExitCode::SUCCESS,
-        Err(Failure::Told(code)) => return ExitCode::from(code),
-        Err(Failure::Interrupted) => return ExitCode::from(INTERRUPTED),
-        Err(Failure::Scene(error)) => (error, 2),
-        Err(Failure::Run(error)) => (error, 1),
-    };
+    let Err(failure) = result else { return ExitCode::SUCCESS };
+    let code = failure.code();
+    let (Failure::Scene(error) | Failure::Run(error)) = failure else { return ExitCode::from(code) };
     let messages = causes::messages(&*error);
     if json {
         tell(json!({"event": "error", "code": code, "message": messages.first(), "because": messages.get(1..)}));

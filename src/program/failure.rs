@@ -17,6 +17,16 @@ pub enum Failure {
 pub(crate) const INTERRUPTED: u8 = 130;
 
 impl Failure {
+    /// The exit code.
+    pub(crate) fn code(&self) -> u8 {
+        match self {
+            Self::Scene(_) => 2,
+            Self::Run(_) => 1,
+            Self::Interrupted => INTERRUPTED,
+            Self::Told(code) => *code,
+        }
+    }
+
     pub(crate) fn scene(error: impl Into<Box<dyn Error>>) -> Self {
         Self::Scene(error.into())
     }

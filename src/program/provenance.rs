@@ -24,9 +24,16 @@ pub(super) struct Command {
     pub until: Option<f64>,
     pub steps: Option<u64>,
     pub threads: u64,
+    /// The number of processes. Results do not depend on it, so a run is reproduced by one process.
+    #[serde(default = "one")]
+    pub processes: usize,
     #[serde(default)]
     pub gpu: bool,
     pub check_tangent: Option<u64>,
+}
+
+fn one() -> usize {
+    1
 }
 
 /// The program and the machine. Another one may give other bits.

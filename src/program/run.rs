@@ -3,13 +3,15 @@
 use super::directory;
 use super::failure::{Failure, INTERRUPTED, print, tell};
 use super::probes::{Bound, bound_probes};
-use super::provenance::{Command, Provenance};
+use super::provenance::{Command, Maker, Provenance};
 use super::scene_arguments::{SceneArguments, what_accuracy_sets};
-use super::steps::{Schedule, Steps};
+use super::steps::{Records, Schedule, Steps};
+
 use crate::checkpoint::{self, Checkpoints, Identity, Restored};
+use crate::lanes;
 use crate::output::plot::{Look, plot_run};
-use crate::output::{Audience, Outcome, OutputSettings, Recorder, Reference};
-use crate::parallel;
+use crate::output::{Audience, Outcome, OutputSettings, Recorder, Reference, Summary};
+use crate::parallel::{self, Processes};
 use crate::plan::SurfaceUse;
 use crate::scene::{Scene, time::MAX_STEPS};
 use crate::simulation::{AdvanceError, Simulation};
@@ -20,6 +22,7 @@ use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
 use signal_hook::flag;
 use std::cell::OnceCell;
 use std::ffi::OsStr;
+use std::fs::File;
 use std::num::NonZeroU64;
 use std::path::{self, Path, PathBuf};
 use std::sync::Arc;
@@ -66,10 +69,51 @@ pub struct Run {
     /// Form of the progress on standard error: a bar or lines to read, or one JSON object per line for a program.
     #[arg(long, value_enum, default_value_t, conflicts_with = "quiet")]
     progress: Form,
+    /// The number of processes, once they have started.
+    #[arg(skip)]
+    processes: OnceCell<usize>,
+}
+
+/// A run before its first step.
+struct Prepared<const D: usize> {
+    steps: Steps<D>,
+    /// The entries of the report that are known.
+    inputs: Map<String, Value>,
+    /// The warnings about the scene, which have been told.
+    warnings: Vec<String>,
+    directory: PathBuf,
+    /// Keeps the directory locked against other runs.
+    _lock: Option<File>,
+}
+
+/// The result of this process, if all processes succeed. Otherwise the first process that fails returns its failure, which the program tells. The
+/// others end without a word and with exit code 0, because a launcher kills all processes when it sees another code.
+fn agreed<R>(processes: &Processes, result: Result<R, Failure>) -> Result<R, Failure> {
+    let (codes, _) = processes.joined(vec![result.as_ref().err().map_or(0, Failure::code)]);
+    match codes.iter().position(|code| *code != 0) {
+        Some(first) if first != processes.rank() => Err(Failure::Told(0)),
+        _ => result,
+    }
+}
+
+/// Refuses processes of another build, or on a processor that rounds otherwise.
+fn check_likeness(processes: &Processes) -> Result<(), Failure> {
+    if processes.count() == 1 {
+        return Ok(());
+    }
+    let own = format!("{:?} {}", Maker::here().build, lanes::rounds_once());
+    let (all, _) = processes.joined(vec![crc32fast::hash(own.as_bytes())]);
+    match all.iter().position(|one| *one != all[0]) {
+        None => Ok(()),
+        Some(rank) => Err(Failure::scene(format!(
+            "process {rank} is another build than process 0, or its processor does not round a product and a sum in the same way: start all \
+             processes with one program, on machines of one kind"
+        ))),
+    }
 }
 
 /// Parser of an option that takes a whole number from `min` to `max`.
-fn whole(min: u64, max: u64) -> impl Fn(&str) -> Result<u64, String> + Clone {
+pub(super) fn whole(min: u64, max: u64) -> impl Fn(&str) -> Result<u64, String> + Clone {
     move |text| {
         let number = text.parse().ok().filter(|number| (min..=max).contains(number));
         number.ok_or_else(|| format!("must be a whole number from {min} to {max}"))
@@ -95,9 +139,22 @@ impl Run {
         self.progress == Form::Json
     }
 
-    /// Runs the scene.
+    /// Runs the scene, together with the other processes that a launcher of MPI has started.
     pub(crate) fn execute(&self) -> Result<(), Failure> {
         let start = Instant::now();
+        let processes = Processes::launched().map_err(Failure::scene)?;
+        self.processes.get_or_init(|| processes.count());
+        agreed(&processes, check_likeness(&processes))?;
+        let scene = agreed(&processes, self.scene_of(&processes))?;
+        match scene.dimension() {
+            1 => self.execute_in::<1>(&scene, start, &processes),
+            2 => self.execute_in::<2>(&scene, start, &processes),
+            _ => self.execute_in::<3>(&scene, start, &processes),
+        }
+    }
+
+    /// Reads the scene, and sets the number of threads: by default one, if there are several processes.
+    fn scene_of(&self, processes: &Processes) -> Result<Scene, Failure> {
         let mut scene = self.scene.read()?;
         if let Some(until) = self.until {
             // The end of the scene passed all checks, so every problem is one of the option.
@@ -107,17 +164,55 @@ impl Run {
                 return Err(Failure::scene(format!("--until: {problems}")));
             }
         }
-        if let Some(threads) = self.threads {
+        if self.gpu && processes.count() > 1 {
+            return Err(Failure::scene("--gpu: several processes cannot use a GPU yet; start one process"));
+        }
+        if let Some(threads) = self.threads.or((processes.count() > 1).then_some(1)) {
             parallel::use_threads(threads as usize).map_err(Failure::run)?;
         }
-        match scene.dimension() {
-            1 => self.execute_in::<1>(&scene, start),
-            2 => self.execute_in::<2>(&scene, start),
-            _ => self.execute_in::<3>(&scene, start),
-        }
+        Ok(scene)
     }
 
-    fn execute_in<const D: usize>(&self, scene: &Scene, start: Instant) -> Result<(), Failure> {
+    fn execute_in<const D: usize>(&self, scene: &Scene, start: Instant, processes: &Processes) -> Result<(), Failure> {
+        let prepared = match processes.rank() {
+            0 => self.prepared::<D>(scene, start),
+            _ => self.prepared_without_records::<D>(scene),
+        };
+        let Prepared { mut steps, inputs, warnings, directory, _lock } = agreed(processes, prepared)?;
+        let (settings, asked_to_stop) = (&mut steps.simulation.settings, steps.interrupted.clone());
+        let others = processes.clone();
+        settings.stop = Some(Stop(Arc::new(move || others.any(asked_to_stop.load(Ordering::Relaxed)))));
+        settings.processes = processes.clone();
+        let ended = steps.take().map_err(|error| {
+            let (time, place) = (steps.simulation.clock.time(), directory.display());
+            self.say(
+                "stopped",
+                &format!("stopped at t = {time}; {place} holds what was written until then, and no report"),
+            );
+            Failure::Run(error)
+        });
+        let ended = ended.and_then(|failure| self.report(steps, failure, &inputs, &warnings, &directory));
+        agreed(processes, ended)
+    }
+
+    /// A run before its first step, in a process that writes no results.
+    fn prepared_without_records<const D: usize>(&self, scene: &Scene) -> Result<Prepared<D>, Failure> {
+        let mut simulation = self.scene.build::<D>(scene)?;
+        let directory = directory::of_results(self.out.as_deref(), &self.scene.scene)?;
+        if self.restart {
+            let settings = serde_json::to_value(scene).map_err(Failure::run)?;
+            let identity = Identity::new(settings, &simulation.particles).with_files(scene.curve_files());
+            checkpoint::restore(&directory, &identity, &mut simulation).map_err(Failure::scene)?;
+        }
+        simulation.settings.check_tangent = self.check_tangent.and_then(NonZeroU64::new);
+        let schedule = Schedule::new(&simulation.clock, scene.time.end, self.steps);
+        let interrupted = stop_on_interrupt().map_err(Failure::run)?;
+        let steps = Steps { simulation, records: None, schedule, interrupted };
+        Ok(Prepared { steps, inputs: Map::new(), warnings: Vec::new(), directory, _lock: None })
+    }
+
+    /// A run before its first step, with its files.
+    fn prepared<const D: usize>(&self, scene: &Scene, start: Instant) -> Result<Prepared<D>, Failure> {
         let mut simulation = self.scene.build::<D>(scene)?;
         self.check_room(&mut simulation)?;
         simulation.settings.check_tangent = self.check_tangent.and_then(NonZeroU64::new);
@@ -141,10 +236,8 @@ impl Run {
             },
         };
         let interrupted = stop_on_interrupt().map_err(Failure::run)?;
-        let asked_to_stop = interrupted.clone();
-        simulation.settings.stop = Some(Stop(Arc::new(move || asked_to_stop.load(Ordering::Relaxed))));
         let reference = Reference::of(&simulation);
-        let _lock = directory::lock(&directory, !self.restart)?;
+        let lock = directory::lock(&directory, !self.restart)?;
         let restored = if self.restart {
             Some(self.restore(&directory, &identity, &mut simulation, scene.time.end)?)
         } else {
@@ -165,16 +258,9 @@ impl Run {
         let checkpoints = scene.output.checkpoint.map(|every| {
             Checkpoints::new(directory.clone(), identity, self.options(&directory), every, restored.as_ref())
         });
-        let mut steps = Steps { simulation, recorder, checkpoints, schedule, interrupted };
-        let failure = steps.take().map_err(|error| {
-            let (time, place) = (steps.simulation.clock.time(), directory.display());
-            self.say(
-                "stopped",
-                &format!("stopped at t = {time}; {place} holds what was written until then, and no report"),
-            );
-            Failure::Run(error)
-        })?;
-        self.report(steps, failure, &inputs, &warnings, &directory)
+        let records = Some(Records { recorder, checkpoints });
+        let steps = Steps { simulation, records, schedule, interrupted };
+        Ok(Prepared { steps, inputs, warnings, directory, _lock: lock })
     }
 
     /// Checks that the arrays of the run have room, and takes the GPU if it is asked for.
@@ -231,7 +317,30 @@ impl Run {
             None if is_interrupted => Outcome::Interrupted,
             None => Outcome::Finished,
         };
-        let summary = steps.recorder.finish(&steps.simulation, inputs, outcome).map_err(Failure::run)?;
+        let (place, is_first) = (directory.display(), steps.records.is_some());
+        let say = |text: &str| {
+            if is_first {
+                self.say("stopped", text)
+            }
+        };
+        if let Some(Records { recorder, .. }) = steps.records {
+            let summary = recorder.finish(&steps.simulation, inputs, outcome).map_err(Failure::run)?;
+            self.show(&summary, warnings, directory)?;
+        }
+        let time = steps.simulation.clock.time();
+        if let Some(error) = failure {
+            say(&format!("stopped at t = {time} after the last good step; its state is in {place}"));
+            return Err(Failure::run(error));
+        }
+        if is_interrupted {
+            say(&format!("interrupted at t = {time} after a whole step; everything up to it is in {place}"));
+            return Err(Failure::Interrupted);
+        }
+        Ok(())
+    }
+
+    /// Prints the summary, and draws the pictures that are asked for.
+    fn show(&self, summary: &Summary, warnings: &[String], directory: &Path) -> Result<(), Failure> {
         let place = directory.display();
         if !self.quiet {
             let told = match warnings.len() + summary.warnings.len() {
@@ -245,16 +354,6 @@ impl Run {
             if let (false, Some(page)) = (self.quiet, drawn.last()) {
                 print(format_args!("pictures  {}", page.display()))?;
             }
-        }
-        let time = steps.simulation.clock.time();
-        if let Some(error) = failure {
-            self.say("stopped", &format!("stopped at t = {time} after the last good step; its state is in {place}"));
-            return Err(Failure::run(error));
-        }
-        if is_interrupted {
-            let text = format!("interrupted at t = {time} after a whole step; everything up to it is in {place}");
-            self.say("stopped", &text);
-            return Err(Failure::Interrupted);
         }
         Ok(())
     }
@@ -316,6 +415,7 @@ impl Run {
             until: self.until,
             steps: self.steps,
             threads: parallel::threads() as u64,
+            processes: self.processes.get().copied().unwrap_or(1),
             gpu: self.gpu,
             check_tangent: self.check_tangent,
         }

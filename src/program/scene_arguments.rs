@@ -5,7 +5,7 @@ use super::probes::{Bound, bound_probes};
 use crate::material::allow_library;
 use crate::memory;
 use crate::particles::Particles;
-use crate::plan::{DeviceUse, Plan};
+use crate::plan::{DeviceUse, Plan, ProcessUse};
 use crate::scene::{self, Override, Scene, SceneError};
 use crate::simulation::Simulation;
 use clap::Args;
@@ -92,16 +92,16 @@ impl SceneArguments {
     }
 
     /// Runs `bfree check`: prints the particles, plan, output and probes of the scene.
-    pub(crate) fn check(&self, gpu: bool) -> Result<(), Failure> {
+    pub(crate) fn check(&self, gpu: bool, ranks: Option<u64>) -> Result<(), Failure> {
         let scene = self.read()?;
         match scene.dimension() {
-            1 => self.check_in::<1>(&scene, gpu),
-            2 => self.check_in::<2>(&scene, gpu),
-            _ => self.check_in::<3>(&scene, gpu),
+            1 => self.check_in::<1>(&scene, gpu, ranks),
+            2 => self.check_in::<2>(&scene, gpu, ranks),
+            _ => self.check_in::<3>(&scene, gpu, ranks),
         }
     }
 
-    fn check_in<const D: usize>(&self, scene: &Scene, gpu: bool) -> Result<(), Failure> {
+    fn check_in<const D: usize>(&self, scene: &Scene, gpu: bool, ranks: Option<u64>) -> Result<(), Failure> {
         let mut simulation = self.build::<D>(scene)?;
         let mut lines: Vec<String> = scene.title.iter().cloned().collect();
         lines.extend(what_accuracy_sets(scene).map(|set| format!("accuracy      {set}")));
@@ -124,7 +124,12 @@ impl SceneArguments {
             let contact = "contact       bodies feel each other before their surfaces meet";
             lines.push(format!("{contact}: {felt}, see docs/src/limits.md"));
         }
-        lines.push(self.plan(&simulation)?.to_string());
+        let plan = self.plan(&simulation)?;
+        lines.push(plan.to_string());
+        if let Some(ranks) = ranks {
+            let each = ProcessUse::of(&simulation, &plan, ranks as usize).map_err(|error| self.unusable(error))?;
+            lines.push(each.to_string());
+        }
         if gpu {
             lines.push(format!("gpu           {}", self.plan_on_gpu(&mut simulation)?));
         }

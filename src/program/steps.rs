@@ -3,8 +3,8 @@
 use crate::checkpoint::Checkpoints;
 use crate::clock::Clock;
 use crate::output::Recorder;
-use crate::parallel::in_pool;
-use crate::simulation::{AdvanceError, Simulation};
+use crate::parallel::{Processes, in_pool};
+use crate::simulation::{AdvanceError, Simulation, StepReport};
 use std::error::Error;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -53,44 +53,96 @@ impl Schedule {
     }
 }
 
-/// A simulation in progress, with its records.
-pub struct Steps<const D: usize> {
-    pub simulation: Simulation<D>,
+/// The files of a run.
+pub struct Records<const D: usize> {
     pub recorder: Recorder<D>,
     /// `None` without checkpoints, and after the last one.
     pub checkpoints: Option<Checkpoints>,
+}
+
+impl<const D: usize> Records<D> {
+    fn write_checkpoint_if_due(&mut self, simulation: &Simulation<D>) -> Result<(), Box<dyn Error>> {
+        match &mut self.checkpoints {
+            Some(checkpoints) => Ok(checkpoints.write_if_due(simulation, &mut self.recorder)?),
+            None => Ok(()),
+        }
+    }
+
+    /// Writes the last checkpoint. It precedes the last snapshot and a shortened step. A longer run has neither of them here.
+    fn write_last_checkpoint(&mut self, simulation: &Simulation<D>) -> Result<(), Box<dyn Error>> {
+        match self.checkpoints.take() {
+            Some(mut checkpoints) => Ok(checkpoints.write(simulation, &mut self.recorder)?),
+            None => Ok(()),
+        }
+    }
+}
+
+/// A simulation in progress, with its records.
+pub struct Steps<const D: usize> {
+    pub simulation: Simulation<D>,
+    /// `None` in all processes but the first.
+    pub records: Option<Records<D>>,
     pub schedule: Schedule,
     /// Set by another thread to end the run after a whole step.
     pub interrupted: Arc<AtomicBool>,
 }
 
 impl<const D: usize> Steps<D> {
-    /// Takes steps until the end, an interruption, or a failed step, whose error is returned.
+    /// Takes steps until the end, an interruption, or a failed step, whose error is returned. All processes end after the same step.
     ///
     /// # Errors
     /// The results cannot be written.
     pub(crate) fn take(&mut self) -> Result<Option<AdvanceError>, Box<dyn Error>> {
+        let processes = self.simulation.settings.processes.clone();
+        let mut written = Ok(());
         loop {
-            if let Some(checkpoints) = &mut self.checkpoints {
-                checkpoints.write_if_due(&self.simulation, &mut self.recorder)?;
+            written = written.and_then(|()| self.write(Records::write_checkpoint_if_due));
+            if processes.any(written.is_err()) {
+                return written.map(|()| None);
             }
-            let interrupted = self.interrupted.load(Ordering::Relaxed);
+            let interrupted = processes.any(self.interrupted.load(Ordering::Relaxed));
             if interrupted || self.schedule.whole_steps_are_taken(&self.simulation.clock) {
-                // This checkpoint precedes the last snapshot and a shortened step. A longer run has neither of them here.
-                if let Some(mut checkpoints) = self.checkpoints.take() {
-                    checkpoints.write(&self.simulation, &mut self.recorder)?;
-                }
-                if interrupted || !self.schedule.shorten(&mut self.simulation.clock) {
-                    return Ok(None);
+                let last = self.write(Records::write_last_checkpoint);
+                let failed = processes.any(last.is_err());
+                if failed || interrupted || !self.schedule.shorten(&mut self.simulation.clock) {
+                    return last.map(|()| None);
                 }
             }
             let simulation = &mut self.simulation;
             match in_pool(|| simulation.advance()) {
-                Ok(step) => self.recorder.record(&self.simulation, &step)?,
+                Ok(step) => {
+                    check_agreement(&processes, &step)?;
+                    written = self.write(|records, at| Ok(records.recorder.record(at, &step)?));
+                }
                 // The next round of the loop handles the interruption.
                 Err(error) if error.cause.is_stopped() => {}
                 Err(error) => return Ok(Some(error)),
             }
         }
+    }
+
+    /// Calls `write`, if this process writes.
+    fn write(
+        &mut self,
+        write: impl FnOnce(&mut Records<D>, &Simulation<D>) -> Result<(), Box<dyn Error>>,
+    ) -> Result<(), Box<dyn Error>> {
+        self.records.as_mut().map_or(Ok(()), |records| write(records, &self.simulation))
+    }
+}
+
+/// Processes that hold other numbers would take other decisions.
+///
+/// # Errors
+/// The residuals of a step do not have the same bits in all processes.
+fn check_agreement<const D: usize>(processes: &Processes, step: &StepReport<D>) -> Result<(), Box<dyn Error>> {
+    let last = step.newton.history.iterations.last();
+    let (all, _) = processes.joined(vec![last.map_or(0, |one| one.residual.to_bits())]);
+    match all.iter().position(|one| *one != all[0]) {
+        None => Ok(()),
+        Some(rank) => Err(format!(
+            "process {rank} computes other numbers than process 0, perhaps with another processor or another mathematical library: start all \
+             processes on machines of one kind"
+        )
+        .into()),
     }
 }

@@ -38,6 +38,7 @@ mod path;
 mod pictures;
 mod plasticity;
 mod points;
+mod processes;
 mod program;
 mod rebound;
 mod reproduce;

@@ -1,0 +1,317 @@
+//! Several processes: the same bits for any number of them, the same errors, and nothing that hangs. Here a process is a thread of the test, or
+//! one that a launcher of MPI starts, where there is one.
+
+use crate::support::{Failure, Said, built, merged, said, scene, solid};
+use bfree::parallel::{Exchange, Processes};
+use bfree::simulation::{Simulation, StepReport};
+use serde_json::json;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread;
+use std::time::Duration;
+
+/// The state and the report of a step, as bits.
+fn bits<const D: usize>(simulation: &Simulation<D>, step: &StepReport<D>) -> Vec<u64> {
+    let particles = simulation.particles.by_id();
+    let vectors = particles.position.iter().chain(&particles.velocity).chain(&particles.acceleration);
+    let numbers = vectors.flat_map(|vector| vector.iter().copied());
+    let gradients = particles.displacement_gradient.iter().flat_map(|gradient| gradient.iter().copied());
+    let reactions = step.reactions.iter().flat_map(|reaction| reaction.force.iter().copied());
+    let forces = step.obstacles.iter().chain(&step.pairs).flat_map(|contact| contact.force.iter().copied());
+    let iterations = step.newton.history.iterations.iter().map(|one| one.residual);
+    let energies =
+        [simulation.strain_energy(), simulation.external_work, simulation.dissipated, simulation.clock.time()];
+    let all =
+        numbers.chain(gradients).chain(particles.memory.iter().copied()).chain(particles.dilatation.iter().copied());
+    all.chain(reactions).chain(forces).chain(iterations).chain(energies).map(f64::to_bits).collect()
+}
+
+/// A run of every process, or the error of each.
+type Runs = Vec<Result<Vec<Vec<u64>>, String>>;
+
+/// Steps of the same simulation in every process.
+fn runs<const D: usize>(start: &Simulation<D>, processes: Vec<Processes>, steps: usize) -> Runs {
+    let run = |processes: Processes| {
+        let mut simulation = start.clone();
+        simulation.settings.processes = processes;
+        let step = |_| match simulation.advance() {
+            Ok(step) => Ok(bits(&simulation, &step)),
+            Err(error) => Err(format!("{error:?}").split("seconds").next().unwrap_or_default().to_owned()),
+        };
+        (0..steps).map(step).collect()
+    };
+    thread::scope(|scope| {
+        let run = &run;
+        let all: Vec<_> = processes.into_iter().map(|one| scope.spawn(move || run(one))).collect();
+        all.into_iter().map(|one| one.join().unwrap()).collect()
+    })
+}
+
+/// Steps of one process, and of teams of these sizes, have the same bits.
+fn agree<const D: usize>(name: &str, start: &Simulation<D>, counts: &[usize], steps: usize) {
+    let alone = runs(start, vec![Processes::default()], steps).remove(0);
+    for &count in counts {
+        for (rank, one) in runs(start, Processes::as_threads(count), steps).into_iter().enumerate() {
+            if let (Err(one), Err(alone)) = (&one, &alone) {
+                assert_eq!(one, alone, "{name}: process {rank} of {count}");
+            }
+            assert!(one == alone, "{name}: process {rank} of {count}");
+        }
+    }
+}
+
+/// [`agree`] for a shipped scene.
+fn shipped_agrees<const D: usize>(name: &str, overrides: &[&str], counts: &[usize]) -> Result<(), Failure> {
+    agree(&format!("{name} {overrides:?}"), &scene::<D>(name, overrides)?, counts, 2);
+    Ok(())
+}
+
+#[test]
+fn scenes_have_the_same_bits_for_any_number_of_processes() -> Result<(), Failure> {
+    // Two bodies, contact with friction, multigrid, a kept grid, plasticity, follower pressure and mixed form, defaults.
+    shipped_agrees::<2>("collision.json", &[], &[2, 7])?;
+    shipped_agrees::<2>("billiard.json", &["grid.spacing=0.25"], &[2, 4])?;
+    shipped_agrees::<2>("wedge.json", &[], &[2, 3])?;
+    shipped_agrees::<2>("compaction.json", &[], &[2, 7])?;
+    shipped_agrees::<3>("block_static.json", &["grid.spacing=0.25"], &[2, 3])?;
+    shipped_agrees::<2>("elastica.json", &[], &[3])?;
+    shipped_agrees::<2>("cook_plastic.json", &[], &[2, 4])?;
+    shipped_agrees::<2>("ring.json", &[], &[2, 7])?;
+    shipped_agrees::<3>("ball_drop.json", &[], &[3])?;
+    shipped_agrees::<1>("riemann.json", &[], &[2, 7])
+}
+
+#[test]
+fn every_family_has_the_same_bits() -> Result<(), Failure> {
+    for family in [
+        "\"linear\"",
+        "\"gimp\"",
+        "{\"bspline\": {\"degree\": 2}}",
+        "{\"bspline\": {\"degree\": 3}}",
+        "{\"lme\": {\"gamma\": 3}}",
+        "{\"lme\": {\"gamma\": 3, \"support\": \"circle\"}}",
+    ] {
+        let family = format!("approximation={family}");
+        shipped_agrees::<2>("rebound.json", &[&family, "time.step=0.5"], &[2, 3])?;
+        shipped_agrees::<2>("cook.json", &[&family, "solver.krylov.preconditioner=\"multigrid\""], &[2])?;
+    }
+    Ok(())
+}
+
+#[test]
+fn schemes_and_terms_have_the_same_bits() -> Result<(), Failure> {
+    let energy_momentum = "time={\"step\": 0.05, \"end\": 80, \"scheme\": \"energy_momentum\"}";
+    shipped_agrees::<2>("rebound.json", &[energy_momentum], &[3])?;
+    let damped = "damping={\"mass\": 0.1, \"stiffness\": 0.01}";
+    shipped_agrees::<2>("rebound.json", &["time.lumping=0.3", damped], &[3])?;
+    shipped_agrees::<2>("cook.json", &["bodies.0.volumetric=\"mean_dilatation\"", "aggregation=true"], &[2, 5])?;
+    let arc_length = "time={\"step\": 0.1, \"end\": 1, \"scheme\": \"arc_length\"}";
+    shipped_agrees::<2>("elastica.json", &[arc_length, "grid.spacing=0.5"], &[2])
+}
+
+/// Balls that fly at each other and at a free obstacle, in three dimensions.
+#[test]
+fn contact_has_the_same_bits() -> Result<(), Failure> {
+    let ball = |name, x: f64, velocity: [f64; 3]| {
+        let shape = json!({"ball": {"center": [x, 1.0, 1.0], "radius": 0.4}});
+        merged(solid(name, 1000, shape), json!({"velocity": velocity}))
+    };
+    let start = built::<3>(&json!({
+        "grid": {"size": [3, 2, 2], "spacing": 0.25}, "time": {"step": 0.01, "end": 1},
+        "bodies": [ball("left", 0.7, [2.0, 0.1, 0.0]), ball("right", 1.52, [0.0; 3])], "contact": {"friction": 0.3},
+    }))?;
+    agree("two balls", &start, &[2, 5], 6);
+    Ok(())
+}
+
+#[test]
+fn a_step_that_fails_fails_in_all_processes() -> Result<(), Failure> {
+    let mut start = scene::<2>("rebound.json", &[])?;
+    start.particles.velocity[50] *= 200.0;
+    start.settings.newton.max_iterations = 2;
+    agree("halved steps", &start, &[2, 7], 2);
+    start.particles.velocity.iter_mut().for_each(|v| *v *= 1e4);
+    agree("out of the grid", &start, &[3], 1);
+    start.particles.velocity.fill(bfree::tensor::Vector::zeros());
+    start.particles.displacement_gradient[17][(0, 0)] = -1.5;
+    agree("turned inside out", &start, &[3], 1);
+    Ok(())
+}
+
+/// Counts calls and bytes.
+#[derive(Debug)]
+struct Counted(Processes, Arc<[AtomicUsize; 2]>);
+
+impl Exchange for Counted {
+    fn rank(&self) -> usize {
+        self.0.rank()
+    }
+
+    fn count(&self) -> usize {
+        self.0.count()
+    }
+
+    fn exchange(&self, lengths: &[usize], all: &mut [u8]) {
+        self.1[0].fetch_add(1, Ordering::Relaxed);
+        self.1[1].fetch_add(lengths[self.rank()], Ordering::Relaxed);
+        let start: usize = lengths[..self.rank()].iter().sum();
+        let (told, _) = self.0.joined(all[start..start + lengths[self.rank()]].to_vec());
+        all.copy_from_slice(&told);
+    }
+}
+
+/// Messages and bytes of a run are a property of the scene: a process tells its part of the nodes, and a little more at the interfaces.
+#[test]
+fn a_product_tells_each_node_once() -> Result<(), Failure> {
+    let start = scene::<3>("block_static.json", &["grid.spacing=0.25"])?;
+    let nodes = start.next_step()?.nodes().len();
+    for count in [2, 4] {
+        let counts: Vec<Arc<[AtomicUsize; 2]>> = (0..count).map(|_| Arc::default()).collect();
+        let team = Processes::as_threads(count).into_iter().zip(&counts);
+        let team = team.map(|(one, counts)| Processes::new(Counted(one, counts.clone()))).collect();
+        assert!(runs(&start, team, 1).into_iter().all(|one| one.is_ok()));
+        let told: Vec<[usize; 2]> =
+            counts.iter().map(|one| [0, 1].map(|which| one[which].load(Ordering::Relaxed))).collect();
+        let bytes: usize = told.iter().map(|[_, bytes]| bytes).sum();
+        println!("{count} processes, {nodes} nodes: messages and bytes of each {told:?}");
+        assert!(told.iter().all(|[messages, _]| *messages == told[0][0]));
+        assert!(bytes > 0);
+    }
+    Ok(())
+}
+
+/// The launchers of MPI on this machine, with the options that let root start more processes than there are cores.
+fn launchers() -> Vec<Vec<&'static str>> {
+    let known = [
+        vec!["mpirun.openmpi", "--allow-run-as-root", "--oversubscribe"],
+        vec!["mpirun.mpich"],
+        vec!["mpirun", "--allow-run-as-root", "--oversubscribe"],
+    ];
+    let is_there = |name: &str| {
+        let folders = std::env::var_os("PATH").unwrap_or_default();
+        std::env::split_paths(&folders).any(|folder| folder.join(name).is_file())
+    };
+    let mut found: Vec<_> = known.into_iter().filter(|one| is_there(one[0])).collect();
+    if found.len() > 1 {
+        found.retain(|one| one[0] != "mpirun");
+    }
+    if found.is_empty() {
+        println!("no launcher of MPI is installed: this test was skipped");
+    }
+    found
+}
+
+/// `bfree run` with these arguments in `count` processes.
+fn launched(launcher: &[&str], count: usize, arguments: &[&str]) -> Command {
+    let mut command = Command::new(launcher[0]);
+    command.args(&launcher[1..]).args(["-n", &count.to_string(), env!("CARGO_BIN_EXE_bfree"), "run"]).args(arguments);
+    command
+}
+
+/// The files of a run, without those that hold times or flags.
+fn files(folder: &Path) -> Result<BTreeMap<PathBuf, Vec<u8>>, Failure> {
+    let mut files = BTreeMap::new();
+    for entry in std::fs::read_dir(folder)? {
+        let path = entry?.path();
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let is_of_results = name.ends_with(".csv") || name.ends_with(".vtu") || name.ends_with(".pvd");
+        if path.is_file() && is_of_results {
+            files.insert(PathBuf::from(name), std::fs::read(&path)?);
+        }
+    }
+    Ok(files)
+}
+
+#[test]
+fn a_run_under_mpi_writes_the_same_files() -> Result<(), Failure> {
+    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/ball_drop.json");
+    let scene = scene.to_str().unwrap();
+    for launcher in launchers() {
+        let folder = tempfile::tempdir()?;
+        let out = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+        let arguments = ["--steps", "5", "--set", "output.checkpoint=2", "--set", "output.every=0.01"];
+        let run = |count: usize, name: &str, more: &[&str]| {
+            let out = out(name);
+            said(&mut launched(&launcher, count, &[&[scene, "--out", &out], &arguments[..], more].concat()))
+        };
+        let (code, shown, told) = run(1, "one", &[])?;
+        assert_eq!(code, Some(0), "{told}");
+        for count in [2, 3] {
+            let (code, of_several, told) = run(count, &format!("of {count}"), &[])?;
+            assert_eq!(code, Some(0), "{launcher:?}: {told}");
+            assert_eq!(of_several.matches("results").count(), shown.matches("results").count(), "{of_several}");
+            assert!(files(Path::new(&out("one")))? == files(Path::new(&out(&format!("of {count}"))))?, "{launcher:?}");
+        }
+        // An error is told once, and all processes end.
+        let (code, _, told): Said = run(3, "one", &[])?;
+        assert_eq!((code, told.matches("error: ").count()), (Some(2), 1), "{launcher:?}: {told}");
+        let (code, _, told): Said = said(&mut launched(&launcher, 2, &["no_such_scene.json"]))?;
+        assert_eq!((code, told.matches("error: ").count()), (Some(2), 1), "{launcher:?}: {told}");
+    }
+    Ok(())
+}
+
+/// The process numbers of the programs that write to a folder, without their launcher.
+fn writing_to(out: &str) -> Vec<u32> {
+    let entries = std::fs::read_dir("/proc").into_iter().flatten().flatten();
+    let numbers = entries.filter_map(|entry| entry.file_name().to_str()?.parse::<u32>().ok());
+    let is_one = |number: &u32| {
+        let line = std::fs::read(format!("/proc/{number}/cmdline")).unwrap_or_default();
+        let words: Vec<_> = line.split(|byte| *byte == 0).collect();
+        words.first() == Some(&env!("CARGO_BIN_EXE_bfree").as_bytes()) && words.contains(&out.as_bytes())
+    };
+    numbers.filter(is_one).collect()
+}
+
+/// Sends a signal to the process `which` of a run after some of its steps.
+fn signal(signal: &str, which: usize, out: &str) -> Result<(), Failure> {
+    let written = || std::fs::read_to_string(Path::new(out).join("history.csv")).map_or(0, |text| text.lines().count());
+    while written() < 4 {
+        thread::sleep(Duration::from_millis(5));
+    }
+    let mut numbers = writing_to(out);
+    numbers.sort_unstable();
+    let number = numbers.get(which).ok_or("the run has ended")?.to_string();
+    assert!(Command::new("kill").args([signal, &number]).status()?.success());
+    Ok(())
+}
+
+/// A killed process ends the run, and so does one that is asked to stop. Both runs continue on another number of processes with the same bits.
+#[test]
+fn a_process_that_ends_ends_all() -> Result<(), Failure> {
+    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/rebound.json");
+    let arguments = [scene.to_str().unwrap(), "--steps", "400", "--quiet", "--set", "output.checkpoint=1"];
+    for launcher in launchers() {
+        let folder = tempfile::tempdir()?;
+        let out = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+        let whole = out("whole");
+        let (code, _, told) = said(&mut launched(&launcher, 1, &[&arguments[..], &["--out", &whole]].concat()))?;
+        assert_eq!(code, Some(0), "{told}");
+        for (name, which) in [("-KILL", 0), ("-KILL", 2), ("-TERM", 1)] {
+            let out = out(&format!("{name}{which}"));
+            let run = [&arguments[..], &["--out", &out]].concat();
+            let mut child = launched(&launcher, 3, &run).stdout(Stdio::null()).stderr(Stdio::null()).spawn()?;
+            signal(name, which, &out)?;
+            let code = child.wait()?.code();
+            assert!(code != Some(0), "{launcher:?} {name} {which}: {code:?}");
+            assert_eq!(writing_to(&out), Vec::<u32>::new(), "{launcher:?} {name} {which}");
+            let (code, _, told) = said(&mut launched(&launcher, 2, &[&run[..], &["--restart"]].concat()))?;
+            assert_eq!(code, Some(0), "{launcher:?} {name} {which}: {told}");
+            assert!(files(Path::new(&whole))? == files(Path::new(&out))?, "{launcher:?} {name} {which}");
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn a_launcher_without_its_library_is_told() -> Result<(), Failure> {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_bfree"));
+    command.args(["run", "scenes/rebound.json"]).env("OMPI_COMM_WORLD_SIZE", "2").env("BFREE_MPI", "/no/libmpi.so");
+    let (code, _, told) = said(&mut command)?;
+    assert_eq!(code, Some(2));
+    assert!(told.contains("/no/libmpi.so") && told.contains("BFREE_MPI"), "{told}");
+    Ok(())
+}
