@@ -8,12 +8,16 @@ use std::env;
 use std::ffi::{c_int, c_void};
 use std::fmt::{self, Debug};
 use std::ptr::null_mut;
+use std::thread::panicking;
 
 /// The environment variable with the path of a library.
 const PATH: &str = "BFREE_MPI";
 
 /// One call hands over this many bytes at most, because MPI counts with 32 bits.
 const MOST: usize = 1 << 30;
+
+/// Exit code of a program that panics.
+const PANICKED: c_int = 101;
 
 /// `MPI_THREAD_SERIALIZED`: any thread makes the calls, one at a time.
 const SERIALIZED: c_int = 2;
@@ -37,6 +41,21 @@ pub enum MpiError {
         /// The error of the system.
         source: libloading::Error,
     },
+    /// The library has started other processes than the launcher.
+    #[error(
+        "the launcher of MPI has started {launched} processes, but its library counts {count}: name the library of the launcher in {PATH}"
+    )]
+    OtherLauncher {
+        /// The processes of the launcher.
+        launched: usize,
+        /// The processes of the library.
+        count: usize,
+    },
+    /// The library allows calls from one thread only.
+    #[error(
+        "the library of MPI does not allow calls from several threads (MPI_THREAD_SERIALIZED): name another one in {PATH}"
+    )]
+    OneThread,
     /// A call failed.
     #[error("{name} failed with the code {code}")]
     Call {
@@ -48,10 +67,11 @@ pub enum MpiError {
 }
 
 /// The calls of an MPI library, whose handles are of type H.
-struct Mpi<H> {
+struct Mpi<H: Copy> {
     all_gather: AllGather<H>,
     broadcast: Broadcast<H>,
     finalize: Finalize,
+    abort: Abort<H>,
     world: H,
     byte: H,
     /// `MPI_IN_PLACE`
@@ -67,6 +87,7 @@ type Number<H> = unsafe extern "C" fn(H, *mut c_int) -> c_int;
 type AllGather<H> =
     unsafe extern "C" fn(*const c_void, c_int, H, *mut c_void, *const c_int, *const c_int, H, H) -> c_int;
 type Broadcast<H> = unsafe extern "C" fn(*mut c_void, c_int, H, c_int, H) -> c_int;
+type Abort<H> = unsafe extern "C" fn(H, c_int) -> c_int;
 type Finalize = unsafe extern "C" fn() -> c_int;
 
 impl Processes {
@@ -78,16 +99,14 @@ impl Processes {
     pub fn launched() -> Result<Self, MpiError> {
         let variable = |name| env::var(name).ok().and_then(|value| value.parse::<usize>().ok());
         let (open_mpi, others) = (variable("OMPI_COMM_WORLD_SIZE"), variable("PMI_SIZE"));
-        let names: &[&str] = match open_mpi.or(others) {
-            Some(1) => &[],
-            Some(_) if open_mpi.is_some() => &["libmpi.so.40", "libmpi.so", "libmpi.dylib"],
-            Some(_) => &["libmpi.so.12", "libmpich.so.12", "libmpi.so", "libmpi.dylib"],
-            None if variable("PMIX_RANK").is_some() => &["libmpi.so.40", "libmpi.so", "libmpi.dylib"],
-            None => &[],
-        };
-        if names.is_empty() {
+        let by_pmix = variable("PMIX_RANK").and_then(|_| variable("SLURM_NTASKS"));
+        let Some(launched) = open_mpi.or(others).or(by_pmix).filter(|count| *count > 1) else {
             return Ok(Self::default());
-        }
+        };
+        let names: &[&str] = match others {
+            Some(_) if open_mpi.is_none() => &["libmpi.so.12", "libmpich.so.12", "libmpi.so", "libmpi.dylib"],
+            _ => &["libmpi.so.40", "libmpi.so", "libmpi.so.12", "libmpich.so.12", "libmpi.dylib"],
+        };
         let path = env::var(PATH).ok();
         let names = path.as_deref().map_or(names.to_vec(), |path| vec![path]);
         // Plug-ins of Open MPI look for its symbols among the global ones.
@@ -100,15 +119,15 @@ impl Processes {
         let address =
             |name: &'static str| unsafe { library.get::<*mut c_void>(name) }.map(|at| at.as_raw_ptr() as usize);
         match (address("ompi_mpi_comm_world"), address("ompi_mpi_byte")) {
-            (Ok(world), Ok(byte)) => Mpi::start(library, [world, byte], 1),
-            _ => Mpi::<c_int>::start(library, [0x4400_0000, 0x4c00_010d], usize::MAX),
+            (Ok(world), Ok(byte)) => Mpi::start(library, launched, [world, byte], 1),
+            _ => Mpi::<c_int>::start(library, launched, [0x4400_0000, 0x4c00_010d], usize::MAX),
         }
     }
 }
 
 impl<H: Copy + Send + Sync + 'static> Mpi<H> {
     /// Starts MPI.
-    fn start(library: Library, [world, byte]: [H; 2], in_place: usize) -> Result<Processes, MpiError> {
+    fn start(library: Library, launched: usize, [world, byte]: [H; 2], in_place: usize) -> Result<Processes, MpiError> {
         let init: Init = *symbol(&library, "MPI_Init_thread")?;
         let (rank_of, count_of): (Number<H>, Number<H>) =
             (*symbol(&library, "MPI_Comm_rank")?, *symbol(&library, "MPI_Comm_size")?);
@@ -119,17 +138,25 @@ impl<H: Copy + Send + Sync + 'static> Mpi<H> {
             checked("MPI_Comm_rank", rank_of(world, &raw mut rank))?;
             checked("MPI_Comm_size", count_of(world, &raw mut count))?;
         }
-        Ok(Processes::new(Self {
+        let this = Self {
             all_gather: *symbol(&library, "MPI_Allgatherv")?,
             broadcast: *symbol(&library, "MPI_Bcast")?,
             finalize: *symbol(&library, "MPI_Finalize")?,
+            abort: *symbol(&library, "MPI_Abort")?,
             world,
             byte,
             in_place,
             rank: rank as usize,
             count: count as usize,
             _library: library,
-        }))
+        };
+        if provided < SERIALIZED {
+            return Err(MpiError::OneThread);
+        }
+        if this.count != launched {
+            return Err(MpiError::OtherLauncher { launched, count: this.count });
+        }
+        Ok(Processes::new(this))
     }
 }
 
@@ -143,7 +170,7 @@ fn checked(name: &'static str, code: c_int) -> Result<(), MpiError> {
     if code == 0 { Ok(()) } else { Err(MpiError::Call { name, code }) }
 }
 
-impl<H> Debug for Mpi<H> {
+impl<H: Copy> Debug for Mpi<H> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Mpi").field("rank", &self.rank).field("count", &self.count).finish_non_exhaustive()
     }
@@ -182,9 +209,10 @@ impl<H: Copy + Send + Sync> Exchange for Mpi<H> {
     }
 }
 
-impl<H> Drop for Mpi<H> {
+impl<H: Copy> Drop for Mpi<H> {
     fn drop(&mut self) {
+        // Others would wait for ever for a process that panics.
         // Safety: MPI was started, and no other call follows.
-        unsafe { (self.finalize)() };
+        unsafe { if panicking() { (self.abort)(self.world, PANICKED) } else { (self.finalize)() } };
     }
 }

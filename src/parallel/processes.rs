@@ -79,10 +79,7 @@ impl Processes {
             let length = own.len();
             return (own, vec![length]);
         };
-        let mut lengths = vec![0_u64; exchange.count()];
-        lengths[exchange.rank()] = own.len() as u64;
-        self.share(&vec![1; exchange.count()], &mut lengths);
-        let lengths: Vec<usize> = lengths.into_iter().map(|length| length as usize).collect();
+        let lengths: Vec<usize> = self.each(own.len() as u64).into_iter().map(|length| length as usize).collect();
         let before: usize = lengths[..exchange.rank()].iter().sum();
         let mut all = vec![T::zeroed(); lengths.iter().sum()];
         all[before..before + own.len()].copy_from_slice(&own);
@@ -90,9 +87,22 @@ impl Processes {
         (all, lengths)
     }
 
+    /// The values of all processes, in their order.
+    pub fn each<T: Pod>(&self, own: T) -> Vec<T> {
+        let mut all = vec![own; self.count()];
+        self.share(&vec![1; self.count()], &mut all);
+        all
+    }
+
     /// Whether the answer of any process is yes.
     pub fn any(&self, own: bool) -> bool {
-        self.0.is_none() && own || self.0.is_some() && self.joined(vec![u8::from(own)]).0.contains(&1)
+        self.each(u8::from(own)).contains(&1)
+    }
+
+    /// The first process with another value than process 0.
+    pub(crate) fn first_other<T: Pod + PartialEq>(&self, own: T) -> Option<usize> {
+        let all = self.each(own);
+        all.iter().position(|one| *one != all[0])
     }
 
     /// The messages of all processes, in their order.

@@ -77,10 +77,11 @@ impl<const D: usize, L: Law, A: ShapeFunction> Inventory<'_, D, L, A> {
         let (simulation, supports) = (self.simulation, self.supports);
         let linearized =
             tangent_bytes(&simulation.particles, &simulation.bodies, supports, simulation.has_mean_stress());
+        let boxes = supports.box_bytes(1);
         vec![
             (true, "shape functions: N, dN/dx by axis", supports.bytes()),
             (true, "linearized tangent", linearized),
-            (supports.box_bytes() > 0, "boxes of nodes, one for each block of cells", supports.box_bytes()),
+            (boxes > 0, "boxes of nodes, one for each block of cells", boxes),
         ]
     }
 

@@ -60,6 +60,7 @@ impl ProcessUse {
         let vector = size_of::<Vector<f64, D>>();
         // The positions and the places of all particles; the lists of nodes, and the sums of all processes.
         whole += (count * (vector + FOREIGN) + nodes * (2 * size_of::<u32>() + vector)) as u64;
+        let shared = shared + (supports.box_bytes(processes) - supports.box_bytes(1)) as u64;
         let share = largest as f64 / count as f64;
         let bytes = whole + (shared as f64 * share) as u64;
         Ok(Self { processes, share, bytes, whole, told: (told * vector) as u64 })

@@ -89,10 +89,23 @@ struct Prepared<const D: usize> {
 /// The result of this process, if all processes succeed. Otherwise the first process that fails returns its failure, which the program tells. The
 /// others end without a word and with exit code 0, because a launcher kills all processes when it sees another code.
 fn agreed<R>(processes: &Processes, result: Result<R, Failure>) -> Result<R, Failure> {
-    let (codes, _) = processes.joined(vec![result.as_ref().err().map_or(0, Failure::code)]);
+    let codes = processes.each(result.as_ref().err().map_or(0, Failure::code));
     match codes.iter().position(|code| *code != 0) {
-        Some(first) if first != processes.rank() => Err(Failure::Told(0)),
+        // Nothing is told of an interruption, which all processes have seen.
+        Some(first) if first != processes.rank() && codes[first] != INTERRUPTED => Err(Failure::Told(0)),
         _ => result,
+    }
+}
+
+/// Refuses processes that start from another state, such as another checkpoint.
+fn check_start<const D: usize>(processes: &Processes, simulation: &Simulation<D>) -> Result<(), Failure> {
+    let positions: &[u8] = bytemuck::cast_slice(&simulation.particles.position);
+    let own = [simulation.clock.steps() as u32, crc32fast::hash(positions)];
+    match processes.first_other(own) {
+        None => Ok(()),
+        Some(rank) => Err(Failure::scene(format!(
+            "process {rank} starts from another state than process 0: its folder of the scene or of the results is not the same"
+        ))),
     }
 }
 
@@ -102,8 +115,7 @@ fn check_likeness(processes: &Processes) -> Result<(), Failure> {
         return Ok(());
     }
     let own = format!("{:?} {}", Maker::here().build, lanes::rounds_once());
-    let (all, _) = processes.joined(vec![crc32fast::hash(own.as_bytes())]);
-    match all.iter().position(|one| *one != all[0]) {
+    match processes.first_other(crc32fast::hash(own.as_bytes())) {
         None => Ok(()),
         Some(rank) => Err(Failure::scene(format!(
             "process {rank} is another build than process 0, or its processor does not round a product and a sum in the same way: start all \
@@ -179,16 +191,17 @@ impl Run {
             _ => self.prepared_without_records::<D>(scene),
         };
         let Prepared { mut steps, inputs, warnings, directory, _lock } = agreed(processes, prepared)?;
+        agreed(processes, check_start(processes, &steps.simulation))?;
         let (settings, asked_to_stop) = (&mut steps.simulation.settings, steps.interrupted.clone());
         let others = processes.clone();
         settings.stop = Some(Stop(Arc::new(move || others.any(asked_to_stop.load(Ordering::Relaxed)))));
         settings.processes = processes.clone();
         let ended = steps.take().map_err(|error| {
             let (time, place) = (steps.simulation.clock.time(), directory.display());
-            self.say(
-                "stopped",
-                &format!("stopped at t = {time}; {place} holds what was written until then, and no report"),
-            );
+            if steps.records.is_some() {
+                let text = format!("stopped at t = {time}; {place} holds what was written until then, and no report");
+                self.say("stopped", &text);
+            }
             Failure::Run(error)
         });
         let ended = ended.and_then(|failure| self.report(steps, failure, &inputs, &warnings, &directory));

@@ -136,8 +136,7 @@ impl<const D: usize> Steps<D> {
 /// The residuals of a step do not have the same bits in all processes.
 fn check_agreement<const D: usize>(processes: &Processes, step: &StepReport<D>) -> Result<(), Box<dyn Error>> {
     let last = step.newton.history.iterations.last();
-    let (all, _) = processes.joined(vec![last.map_or(0, |one| one.residual.to_bits())]);
-    match all.iter().position(|one| *one != all[0]) {
+    match processes.first_other(last.map_or(0, |one| one.residual.to_bits())) {
         None => Ok(()),
         Some(rank) => Err(format!(
             "process {rank} computes other numbers than process 0, perhaps with another processor or another mathematical library: start all \

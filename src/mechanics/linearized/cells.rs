@@ -83,7 +83,7 @@ impl<const D: usize> CellRows<D> {
         fill: impl Fn(usize, usize, &Tensor<f64, D>, usize, &mut [[f64; LANES]]) + Sync,
     ) -> Self {
         let mut rows = supports.pool().unspecified(supports.groups() * layout.count, [0.0; LANES]);
-        supports.fill_rows(phi, layout.count, &mut rows, |group, at, rows| {
+        supports.fill_all_rows(phi, layout.count, &mut rows, |group, at, rows| {
             rows.fill([0.0; LANES]);
             for (lane, &p) in group.particles.iter().enumerate() {
                 if let Some(cell) = cells.cell(p) {
@@ -91,7 +91,6 @@ impl<const D: usize> CellRows<D> {
                 }
             }
         });
-        supports.share_rows(layout.count, &mut rows);
         Self { cells, layout, rows: Arc::new(rows), stiffness, mixed: None }
     }
 
@@ -158,14 +157,13 @@ impl<const D: usize> CellRows<D> {
     /// δv of every cell.
     pub(crate) fn volume_changes(&self, supports: &Supports<D>, u: &[Vector<f64, D>]) -> Vec<f64> {
         let mut grown = supports.pool().unspecified(supports.groups(), [0.0; LANES]);
-        supports.fill_rows(u, 1, &mut grown, |group, at, grown| {
+        supports.fill_all_rows(u, 1, &mut grown, |group, at, grown| {
             let b = &self.of_group(group.number)[self.layout.b..];
             grown[0] = [0.0; LANES];
             for (b, l) in b.iter().zip(at.gradient.as_flattened()) {
                 (0..LANES).for_each(|lane| grown[0][lane] += b[lane] * l[lane]);
             }
         });
-        supports.share_rows(1, &mut grown);
         self.cells.sums(&grown)
     }
 

@@ -11,7 +11,9 @@ use std::sync::{Arc, OnceLock};
 #[derive(Clone, Debug)]
 pub(crate) struct StressRows {
     form: Form,
-    /// For each group of particles, the numbers of its tangents.
+    /// The first group of this process.
+    first: usize,
+    /// For each group of this process, the numbers of its tangents.
     rows: Arc<Pooled<[f64; LANES]>>,
     factor: f64,
     /// The copy on a device, which all clones share.
@@ -19,9 +21,9 @@ pub(crate) struct StressRows {
 }
 
 impl StressRows {
-    /// Tangents that are stored in `form`.
-    pub(crate) fn new(form: Form, rows: Pooled<[f64; LANES]>) -> Self {
-        Self { form, rows: Arc::new(rows), factor: 1.0, copy: Arc::default() }
+    /// Tangents that are stored in `form`, from the group `first` on.
+    pub(crate) fn new(form: Form, first: usize, rows: Pooled<[f64; LANES]>) -> Self {
+        Self { form, first, rows: Arc::new(rows), factor: 1.0, copy: Arc::default() }
     }
 
     pub(crate) fn times(self, factor: f64) -> Self {
@@ -36,7 +38,7 @@ impl StressRows {
 
     #[inline(always)]
     fn of_group(&self, group: usize, dimension: usize) -> &[[f64; LANES]] {
-        let count = self.form.rows(dimension);
+        let (count, group) = (self.form.rows(dimension), group - self.first);
         &self.rows[group * count..(group + 1) * count]
     }
 

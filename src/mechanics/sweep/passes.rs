@@ -2,6 +2,7 @@
 
 use super::group::At;
 use super::supports::{Implementation, dispatch};
+use super::tiled::Tiled;
 use super::{AtParticle, Group, Mode, Number, Quadratic, Supports, Weights};
 use crate::lanes::LANES;
 use crate::parallel::{First, Message};
@@ -52,8 +53,7 @@ impl<const D: usize> Supports<D> {
         let Ok(()) = self.sweep(field, mode, out, point);
     }
 
-    /// Calls `fill(group, L, rows)` for every group. Each group has `count` rows of its own. With several processes, each of them fills the rows
-    /// of its own groups.
+    /// Calls `fill(group, L, rows)` for every group of this process. Each of them has `count` rows.
     pub(crate) fn fill_rows(
         &self,
         field: &[Vector<f64, D>],
@@ -65,8 +65,16 @@ impl<const D: usize> Supports<D> {
         dispatch!(self, one => one.fill_rows(bytemuck::cast_slice(field), count, rows, &fill));
     }
 
-    /// Tells all processes the rows that each of them has filled.
-    pub(crate) fn share_rows(&self, count: usize, rows: &mut [[f64; LANES]]) {
+    /// [`Self::fill_rows`] for the groups of all processes.
+    pub(crate) fn fill_all_rows(
+        &self,
+        field: &[Vector<f64, D>],
+        count: usize,
+        rows: &mut [[f64; LANES]],
+        fill: impl Fn(Group<'_>, &At<f64, D, D>, &mut [[f64; LANES]]) + Sync,
+    ) {
+        let own = self.own_groups();
+        self.fill_rows(field, count, &mut rows[own.start * count..own.end * count], fill);
         if let Implementation::Tiled(tiled) = &self.implementation {
             tiled.share_rows(count, rows);
         }
@@ -176,15 +184,33 @@ impl<const D: usize> Supports<D> {
         const { assert!(C == 1 || C == D) };
         let point = |_: usize, at: &[At<f64, C, D>], lane: usize| Vector::from_fn(|c, _| at[0].value[c][lane]);
         let mut values = self.pool().unspecified(self.particles(), Vector::zeros());
-        self.at_particles(1, bytemuck::cast_slice(field), Mode::VALUE, &mut values, point);
+        let own = &mut values[self.own_places()];
+        self.at_own_particles(1, bytemuck::cast_slice(field), Mode::VALUE, own, point);
+        self.in_memory_order(&mut values, |tiled, values| tiled.share_numbers(C, bytemuck::cast_slice_mut(values)));
         values
     }
 
-    /// Σ u_I ⊗ ∇_r N_I at every particle.
-    pub(crate) fn gradients(&self, field: &[Vector<f64, D>]) -> Pooled<Tensor<f64, D>> {
+    /// [`Self::values`] at the [own particles](Self::own_particles) of this process.
+    pub(crate) fn own_values(&self, field: &[Vector<f64, D>]) -> Pooled<Vector<f64, D>> {
+        if !self.is_memory_order() {
+            return self.values(field);
+        }
+        let point = |_: usize, at: &[At<f64, D, D>], lane: usize| Vector::from_fn(|c, _| at[0].value[c][lane]);
+        let mut values = self.pool().unspecified(self.own_places().len(), Vector::zeros());
+        self.at_own_particles(1, bytemuck::cast_slice(field), Mode::VALUE, &mut values, point);
+        values
+    }
+
+    /// Σ u_I ⊗ ∇_r N_I at the [own particles](Self::own_particles) of this process.
+    pub(crate) fn own_gradients(&self, field: &[Vector<f64, D>]) -> Pooled<Tensor<f64, D>> {
         let point = |_: usize, at: &[At<f64, D, D>], lane: usize| Tensor::from_fn(|c, k| at[0].gradient[c][k][lane]);
-        let mut gradients = self.pool().unspecified(self.particles(), Tensor::zeros());
-        self.at_particles(1, bytemuck::cast_slice(field), Mode::GRADIENT, &mut gradients, point);
+        let mut gradients = self.pool().unspecified(self.own_particles().len(), Tensor::zeros());
+        if self.is_memory_order() {
+            self.at_own_particles(1, bytemuck::cast_slice(field), Mode::GRADIENT, &mut gradients, point);
+            return gradients;
+        }
+        self.at_own_particles(1, bytemuck::cast_slice(field), Mode::GRADIENT, &mut gradients[self.own_places()], point);
+        self.in_memory_order(&mut gradients, |tiled, all| tiled.share_numbers(D * D, bytemuck::cast_slice_mut(all)));
         gradients
     }
 
@@ -213,12 +239,13 @@ impl<const D: usize> Supports<D> {
             point(p, value, gradient)
         };
         let mut results = vec![R::blank(); self.particles()];
-        self.at_particles(T::FIELDS, &T::flat(field), Mode::BOTH, &mut results, point);
+        self.at_own_particles(T::FIELDS, &T::flat(field), Mode::BOTH, &mut results[self.own_places()], point);
+        self.in_memory_order(&mut results, Tiled::share_at_particles);
         results
     }
 
-    /// Writes `point(p, u and L of every field, lane)` of every particle, in memory order.
-    fn at_particles<R: AtParticle, const C: usize>(
+    /// Writes `point(p, u and L of every field, lane)` of this process's particles, in the order of the passes.
+    fn at_own_particles<R: Copy + Send, const C: usize>(
         &self,
         fields: usize,
         field: &[f64],
@@ -233,7 +260,12 @@ impl<const D: usize> Supports<D> {
             }
         };
         dispatch!(self, one => one.gather(fields, field, mode, &evaluate, results));
+    }
+
+    /// Takes the results of other processes by `share`, and moves all results to the order of the particles in memory.
+    fn in_memory_order<R: Copy>(&self, results: &mut [R], share: impl FnOnce(&Tiled<D>, &mut [R])) {
         if let Implementation::Tiled(tiled) = &self.implementation {
+            share(tiled, results);
             tiled.to_memory_order(results);
         }
     }

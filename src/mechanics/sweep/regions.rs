@@ -29,14 +29,14 @@ type Add<'a> = dyn Fn(&Block, &[f64], usize, &mut [f64]) + Sync + 'a;
 type Write<'a, S, R> = dyn Fn(&mut S, &Block, &mut [R]) + Sync + 'a;
 
 impl<const D: usize> Tiled<D> {
-    fn in_parallel(&self) -> bool {
+    pub(super) fn in_parallel(&self) -> bool {
         parallel::several() && self.groups() >= PARALLEL
     }
 
-    /// Bytes of the boxes of all blocks in the pass with most numbers a node: diagonal blocks of the tangent, or dual numbers.
+    /// Bytes of the boxes of all own blocks in the pass with most numbers a node: diagonal blocks of the tangent, or dual numbers.
     pub(super) fn box_bytes(&self) -> usize {
         let numbers = |block: &Block| block.box_nodes() * (D * D).max(2 * D) + 2 * LANES;
-        if self.in_parallel() { self.own().iter().map(numbers).sum::<usize>() * size_of::<f64>() } else { 0 }
+        self.own().iter().map(numbers).sum::<usize>() * size_of::<f64>()
     }
 
     /// [`super::Supports::sweep`] for `fields` fields of C components side by side. Without a field nothing is gathered.
@@ -187,8 +187,8 @@ impl<const D: usize> Tiled<D> {
         });
     }
 
-    /// Calls `evaluate(group, u and L, results)` for every group, with the results of its particles. They lie in the order of the groups.
-    pub(super) fn gather<R: Message + Send, const C: usize>(
+    /// Calls `evaluate(group, u and L, results)` for every own group, with the results of its particles. They lie in the order of the groups.
+    pub(super) fn gather<R: Send, const C: usize>(
         &self,
         fields: usize,
         field: &[f64],
@@ -203,13 +203,19 @@ impl<const D: usize> Tiled<D> {
             });
         };
         self.write(Block::count, results, &one);
-        self.share(Block::count, results);
     }
 
-    /// Takes the results of other processes' blocks, which are `count(block)` in number.
-    fn share<R: Message>(&self, count: impl Fn(&Block) -> usize, results: &mut [R]) {
+    /// Takes the results at the particles of other processes.
+    pub(super) fn share_at_particles<R: Message>(&self, results: &mut [R]) {
         if let Some((_, shares)) = self.shared() {
-            shares.share_results(&self.blocks, count, results);
+            shares.share_results(&self.blocks, Block::count, results);
+        }
+    }
+
+    /// [`Self::share_at_particles`] for `count` plain numbers at each particle, in place.
+    pub(super) fn share_numbers(&self, count: usize, numbers: &mut [f64]) {
+        if let Some((_, shares)) = self.shared() {
+            shares.share_numbers(&self.blocks, |block| block.count() * count, numbers);
         }
     }
 
@@ -218,19 +224,19 @@ impl<const D: usize> Tiled<D> {
         let one = |(): &mut (), block: &Block, results: &mut [R]| {
             results.iter_mut().enumerate().for_each(|(group, result)| *result = evaluate(block.group(group)));
         };
-        self.write(Block::len, results, &one);
-        self.share(Block::len, results);
+        self.write(Block::len, &mut results[self.own_groups()], &one);
+        if let Some((_, shares)) = self.shared() {
+            shares.share_results(&self.blocks, Block::len, results);
+        }
     }
 
-    /// Calls `write` for every own block with its results, which are `count(block)` in number.
+    /// Calls `write` for every own block with its results, which are `count(block)` in number. There are results of own blocks alone.
     fn write<S: Default + Send, R: Send>(
         &self,
         count: impl Fn(&Block) -> usize,
         mut results: &mut [R],
         write: &Write<'_, S, R>,
     ) {
-        let first = self.shared().map_or(0, |(first, _)| first);
-        results = &mut results[self.blocks[..first].iter().map(&count).sum()..];
         let parts = self.own().iter().filter_map(|block| Some((block, results.split_off_mut(..count(block))?)));
         if self.in_parallel() {
             parallel::for_each_with(parts, &|scratch, (block, results)| write(scratch, block, results));
@@ -240,7 +246,7 @@ impl<const D: usize> Tiled<D> {
         }
     }
 
-    /// Calls `fill(group, L, rows)` for every group. Each group has `count` rows of its own.
+    /// Calls `fill(group, L, rows)` for every own group. Each of them has `count` rows.
     pub(super) fn fill_rows(&self, field: &[f64], count: usize, rows: &mut [[f64; LANES]], fill: &Fill<'_, D>) {
         let one = |scratch: &mut Scratch<D, D>, block: &Block, rows: &mut [[f64; LANES]]| {
             let mut rows = rows.chunks_mut(count);
@@ -253,7 +259,9 @@ impl<const D: usize> Tiled<D> {
 
     /// Tells all processes the rows that they have filled, `count` for each group.
     pub(super) fn share_rows(&self, count: usize, rows: &mut [[f64; LANES]]) {
-        self.share(|block| block.len() * count, rows);
+        if let Some((_, shares)) = self.shared() {
+            shares.share_numbers(&self.blocks, |block| block.len() * count * LANES, rows.as_flattened_mut());
+        }
     }
 }
 

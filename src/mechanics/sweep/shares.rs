@@ -155,7 +155,12 @@ impl Shares {
         }
     }
 
-    /// Each process has written the results of its own blocks, which are `count(block)` in number. Fills in the results of all others.
+    /// Each process has written the numbers of its own blocks, `count(block)` of each. Fills in the numbers of all others.
+    pub(super) fn share_numbers(&self, blocks: &[Block], count: impl Fn(&Block) -> usize, numbers: &mut [f64]) {
+        self.processes.share(&self.by_process(blocks, count), numbers);
+    }
+
+    /// [`Self::share_numbers`] for results of any type.
     pub(super) fn share_results<R: Message>(
         &self,
         blocks: &[Block],

@@ -339,6 +339,30 @@ impl<const D: usize> Supports<D> {
         }
     }
 
+    /// The places of this process's particles in the order of the passes.
+    pub(super) fn own_places(&self) -> Range<usize> {
+        match &self.implementation {
+            Implementation::Plain(plain) => 0..plain.particles(),
+            Implementation::Tiled(tiled) => tiled.own_places(),
+        }
+    }
+
+    /// Whether the particles lie in memory in the order of the passes.
+    pub(super) fn is_memory_order(&self) -> bool {
+        match &self.implementation {
+            Implementation::Plain(_) => true,
+            Implementation::Tiled(tiled) => tiled.is_memory_order,
+        }
+    }
+
+    /// The groups of this process.
+    pub(crate) fn own_groups(&self) -> Range<usize> {
+        match &self.implementation {
+            Implementation::Plain(plain) => 0..plain.groups(),
+            Implementation::Tiled(tiled) => tiled.own_groups(),
+        }
+    }
+
     /// Each process has written `count` numbers for each of its [own particles](Self::own_particles). Fills in the numbers of the others.
     pub(crate) fn share_particles(&self, count: usize, numbers: &mut [f64]) {
         if let Implementation::Tiled(tiled) = &self.implementation {
@@ -378,11 +402,11 @@ impl<const D: usize> Supports<D> {
         dispatch!(self, one => one.bytes())
     }
 
-    /// Bytes of the boxes into which all blocks scatter at the same time. With one thread, the blocks share a box.
-    pub(crate) fn box_bytes(&self) -> usize {
+    /// Bytes of the boxes into which all blocks scatter at the same time. With one thread in one process, the blocks share a box.
+    pub(crate) fn box_bytes(&self, processes: usize) -> usize {
         match &self.implementation {
-            Implementation::Plain(_) => 0,
-            Implementation::Tiled(tiled) => tiled.box_bytes(),
+            Implementation::Tiled(tiled) if processes > 1 || tiled.in_parallel() => tiled.box_bytes(),
+            _ => 0,
         }
     }
 

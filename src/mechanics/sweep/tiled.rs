@@ -124,20 +124,28 @@ impl<const D: usize> Tiled<D> {
         &self.blocks[own(&self.shares, self.blocks.len())]
     }
 
+    /// The groups of this process.
+    pub(super) fn own_groups(&self) -> Range<usize> {
+        let own = self.own();
+        own.first().map_or(0, |first| first.first)..own.last().map_or(0, |last| last.first + last.len())
+    }
+
+    /// The places of this process's particles in [`Self::order`].
+    pub(super) fn own_places(&self) -> Range<usize> {
+        let own = self.own();
+        own.first().map_or(0, |first| first.start as usize)
+            ..own.last().map_or(0, |last| last.start as usize + last.count())
+    }
+
     /// See [`super::Supports::own_particles`].
     pub(super) fn own_particles(&self) -> Range<usize> {
-        let own = self.own();
-        match own.first().filter(|_| self.is_memory_order) {
-            Some(first) => first.start as usize..first.start as usize + own.iter().map(Block::count).sum::<usize>(),
-            None if self.is_memory_order => 0..0,
-            None => 0..self.particles(),
-        }
+        if self.is_memory_order { self.own_places() } else { 0..self.particles() }
     }
 
     /// See [`super::Supports::share_particles`].
     pub(super) fn share_particles(&self, count: usize, numbers: &mut [f64]) {
-        if let Some((shares, _)) = self.shares.as_deref().filter(|_| self.is_memory_order) {
-            shares.share_results(&self.blocks, |block| block.count() * count, numbers);
+        if self.is_memory_order {
+            self.share_numbers(count, numbers);
         }
     }
 

@@ -31,7 +31,8 @@ impl<'a, const D: usize, L: Law> Stress<'a, D, L> {
     pub(super) fn linearized(&self, phi: &[Vector<f64, D>], part: Part) -> Result<StressRows, Inadmissible> {
         let form = self.laws.form();
         let count = form.rows(D);
-        let mut rows = self.supports.pool().unspecified(self.supports.groups() * count, [0.0; LANES]);
+        let own = self.supports.own_groups();
+        let mut rows = self.supports.pool().unspecified(own.len() * count, [0.0; LANES]);
         let evaluate = self.laws.tangents(part, form);
         let failure = First::none();
         self.supports.fill_rows(phi, count, &mut rows, |group, at, rows| {
@@ -40,7 +41,7 @@ impl<'a, const D: usize, L: Law> Stress<'a, D, L> {
             }
         });
         failure.check(self.supports.processes())?;
-        Ok(StressRows::new(form, rows))
+        Ok(StressRows::new(form, own.start, rows))
     }
 }
 

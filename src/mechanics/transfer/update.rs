@@ -82,7 +82,7 @@ pub struct Update<'a, const D: usize> {
     smoothed: Option<[Pooled<Vector<f64, D>>; 2]>,
     /// The internal variables at the end of the step, by particle.
     memory: Option<Vec<f64>>,
-    /// Δx and ∇_r φ of the particles, evaluated once.
+    /// Δx and ∇_r φ of this process's particles, evaluated once.
     moved: OnceCell<Pooled<Vector<f64, D>>>,
     gradients: OnceCell<Pooled<Tensor<f64, D>>>,
 }
@@ -254,14 +254,14 @@ impl<'a, const D: usize> Update<'a, D> {
         self.dphi.iter().map(|dphi| dphi / dt).collect()
     }
 
-    /// Δx of every particle since the last grid reset.
+    /// Δx since the last grid reset, of this process's particles.
     fn moved(&self, supports: &Supports<D>) -> &[Vector<f64, D>] {
-        self.moved.get_or_init(|| supports.values(self.motion()))
+        self.moved.get_or_init(|| supports.own_values(self.motion()))
     }
 
-    /// ∇_r φ of every particle.
+    /// ∇_r φ of this process's particles.
     fn gradients(&self, supports: &Supports<D>) -> &[Tensor<f64, D>] {
-        self.gradients.get_or_init(|| supports.gradients(self.motion()))
+        self.gradients.get_or_init(|| supports.own_gradients(self.motion()))
     }
 
     /// The particle with the smallest id of those that would leave the grid: its id, and its position outside.
@@ -271,14 +271,15 @@ impl<'a, const D: usize> Update<'a, D> {
         supports: &Supports<D>,
         grid: &Grid<D>,
     ) -> Option<(usize, Vector<f64, D>)> {
-        let position = particles.reference().position;
-        let moved = self.moved(supports);
+        let (own, moved) = (supports.own_particles(), self.moved(supports));
+        let (position, id) = (&particles.reference().position[own.clone()], &particles.id[own]);
         let first = parallel::map(moved.len().div_ceil(PART), &|part| {
             let own = part * PART..moved.len().min((part + 1) * PART);
-            let ends = own.map(|p| (particles.id[p] as usize, position[p] + moved[p]));
+            let ends = own.map(|p| (id[p] as usize, position[p] + moved[p]));
             ends.filter(|(_, x)| !grid.contains(x)).min_by_key(|(id, _)| *id)
         });
-        first.into_iter().flatten().min_by_key(|(id, _)| *id)
+        let first = first.into_iter().flatten().min_by_key(|(id, _)| *id);
+        supports.processes().told(&first).into_iter().flatten().min_by_key(|(id, _)| *id)
     }
 
     /// Evaluates the internal variables at the end of the step, which [`Self::commit`] then writes. Returns the id of the first particle of
@@ -294,11 +295,11 @@ impl<'a, const D: usize> Update<'a, D> {
         let variable_count = particles.variable_count;
         let (mut next, undefined) = (particles.memory.clone(), First::none());
         if variable_count > 0 || !particles.dilatation.is_empty() {
-            let gradients = self.gradients(supports);
+            let (own, gradients) = (supports.own_particles(), self.gradients(supports));
             let update = |p: usize, next: &mut [f64]| {
                 let law = &bodies[particles.body[p] as usize].law;
                 let memory = &particles.memory[p * variable_count..(p + 1) * variable_count];
-                let h = Kinematics(particles).displacement_gradient(p, &gradients[p]);
+                let h = Kinematics(particles).displacement_gradient(p, &gradients[p - own.start]);
                 let (at, det_f) = MaterialState::new(h).admissible_or_rest();
                 law.update_variables(&at.in_step(dt, memory), next);
                 let energy = if law.has_potential() { law.energy(&at.in_step(0.0, next)) } else { 0.0 };
@@ -307,7 +308,6 @@ impl<'a, const D: usize> Update<'a, D> {
                     undefined.keep(particles.id[p] as usize, ());
                 }
             };
-            let own = supports.own_particles();
             let mut left = &mut next[own.start * variable_count..];
             let part = |first: usize| {
                 let particles = first..own.end.min(first + PART);
@@ -346,26 +346,29 @@ impl<'a, const D: usize> Update<'a, D> {
             [(&mut particles.velocity, self.delta_velocity), (&mut particles.acceleration, self.delta_acceleration)];
         let with_changes = increments.into_iter().zip(self.smoothed.unwrap_or_default());
         for ((field, delta), changed) in with_changes.filter(|((_, delta), _)| !delta.is_empty()) {
-            let mut delta = supports.values(&delta);
+            let (own, mut delta) = (supports.own_particles(), supports.own_values(&delta));
             if !changed.is_empty() {
-                parallel::zip(&mut delta, &changed, |delta, changed| *delta += changed);
+                parallel::zip(&mut delta, &changed[own.clone()], |delta, changed| *delta += changed);
             }
-            parallel::zip(field, &delta, |field, delta| *field += delta);
+            parallel::zip(&mut field[own], &delta, |field, delta| *field += delta);
+            supports.share_particles(D, bytemuck::cast_slice_mut(field));
         }
         Committed { strain, yielding }
     }
 
     /// Writes x = x_r + Δx and F = (I + ∇_r φ) F_r. Returns the largest strain since the last grid reset.
     fn move_particles(&self, particles: &mut Particles<D>, supports: &Supports<D>) -> f64 {
-        let (moved, gradients) = (self.moved(supports), self.gradients(supports));
+        let (own, moved, gradients) = (supports.own_particles(), self.moved(supports), self.gradients(supports));
         let Particles { position, displacement_gradient, reference, .. } = particles;
-        let reference = reference.as_ref();
-        let parts = position.chunks_mut(PART).zip(displacement_gradient.chunks_mut(PART)).enumerate();
+        let (first, reference) = (own.start, reference.as_ref());
+        let (x, h) = (&mut position[own.clone()], &mut displacement_gradient[own]);
+        let parts = x.chunks_mut(PART).zip(h.chunks_mut(PART)).enumerate();
         let strains = parallel::collect(parts, &|(part, (x, h)): (usize, Part<'_, D>)| {
             let own = part * PART..part * PART + x.len();
             if let Some(reference) = reference {
-                x.copy_from_slice(&reference.position[own.clone()]);
-                h.copy_from_slice(&reference.displacement_gradient[own.clone()]);
+                let of_all = first + own.start..first + own.end;
+                x.copy_from_slice(&reference.position[of_all.clone()]);
+                h.copy_from_slice(&reference.displacement_gradient[of_all]);
             }
             let mut largest = 0.0_f64;
             for ((x, h), (delta_x, g)) in x.iter_mut().zip(h).zip(moved[own.clone()].iter().zip(&gradients[own])) {
@@ -375,7 +378,10 @@ impl<'a, const D: usize> Update<'a, D> {
             }
             largest
         });
-        let largest = strains.into_iter().fold(0.0, f64::max);
+        supports.share_particles(D, bytemuck::cast_slice_mut(position));
+        supports.share_particles(D * D, bytemuck::cast_slice_mut(displacement_gradient));
+        let largest = supports.processes().told(&strains.into_iter().fold(0.0, f64::max));
+        let largest = largest.into_iter().fold(0.0, f64::max);
         mutant!("transfer: no strain resets the grid": largest = 0.0);
         largest
     }
