@@ -84,7 +84,7 @@ fn scenes_have_the_same_bits_for_any_number_of_processes() -> Result<(), Failure
     shipped_agrees::<2>("collision.json", &[], &[2, 7])?;
     shipped_agrees::<2>("billiard.json", &["grid.spacing=0.25"], &[2, 4])?;
     shipped_agrees::<2>("wedge.json", &["grid.spacing=0.05"], &[2, 3])?;
-    shipped_agrees::<2>("compaction.json", &["grid.spacing=0.04"], &[2, 7])?;
+    shipped_agrees::<2>("compaction.json", &["grid.spacing=0.05"], &[2, 7])?;
     shipped_agrees::<3>("block_static.json", &["grid.spacing=0.125"], &[2, 3])?;
     shipped_agrees::<2>("elastica.json", &[], &[3])?;
     shipped_agrees::<2>("cook_plastic.json", &[], &[2, 4])?;
