@@ -67,7 +67,6 @@ pub(super) fn report(effort: &Effort) -> Result<Report, StudyError> {
     // The converged one is the last. Its first bounce alone is needed.
     let cases: &[Case] = match effort {
         Effort::Full => &[
-            ("3", [0.05, 0.005], BOUNCES, ball::<3>),
             ("2", [0.1, 0.005], BOUNCES, ball::<2>),
             ("2", [0.05, 0.005], BOUNCES, ball::<2>),
             ("3", [0.1, 0.005], BOUNCES, ball::<3>),
@@ -82,5 +81,8 @@ pub(super) fn report(effort: &Effort) -> Result<Report, StudyError> {
         add(dimension, *spacing, found, converged.filter(|_| *dimension == "2"));
     }
     report.note("Bounds: issue 52 of the project. The converged height is that of a quarter of the spacing and an eighth of the step.");
+    if *effort == Effort::Full {
+        report.note("Not run: three dimensions at half the spacing, 60,288 particles, which take about two hours.");
+    }
     Ok(report)
 }
