@@ -1,4 +1,4 @@
-//! Processes that run the same program side by side, such as those that MPI starts, and what they tell each other.
+//! Processes that run the same program side by side, such as those that MPI starts, and their messages.
 //!
 //! All processes make the same calls in the same order, and all of them receive the same answers. So they hold the same numbers, and take the
 //! same decisions.

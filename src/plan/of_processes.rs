@@ -1,4 +1,4 @@
-//! What each of several processes holds, and what it tells the others.
+//! The plan of a run in several processes: the bytes that each process holds, and the bytes that it tells the others.
 
 use super::Plan;
 use crate::approximation::ShapeFunction;

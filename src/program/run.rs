@@ -1,14 +1,14 @@
 //! `bfree run`.
 
+use super::agreement::{agreed, check_likeness, check_start};
 use super::directory;
 use super::failure::{Failure, INTERRUPTED, print, tell};
+use super::options::{number, whole};
 use super::probes::{Bound, bound_probes};
-use super::provenance::{Command, Maker, Provenance};
+use super::provenance::{Command, Provenance};
 use super::scene_arguments::{SceneArguments, what_accuracy_sets};
 use super::steps::{Records, Schedule, Steps};
-
 use crate::checkpoint::{self, Checkpoints, Identity, Restored};
-use crate::lanes;
 use crate::output::plot::{Look, plot_run};
 use crate::output::{Audience, Outcome, OutputSettings, Recorder, Reference, Summary};
 use crate::parallel::{self, Processes};
@@ -44,7 +44,7 @@ pub struct Run {
     /// Take at most this many whole time steps; 0 writes the initial state only.
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(0, MAX_STEPS as u64))]
     steps: Option<u64>,
-    /// Threads, 1 to 1024 [default: all cores]. Results are bitwise identical for any number of threads.
+    /// Threads, 1 to 1024 [default: all cores; one in each of several processes]. Results are bitwise identical for any number of threads.
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1, parallel::MOST_THREADS))]
     threads: Option<u64>,
     /// Solve the linear systems on a GPU, an NVIDIA device of compute capability 8 or higher. Results are bitwise identical.
@@ -84,57 +84,6 @@ struct Prepared<const D: usize> {
     directory: PathBuf,
     /// Keeps the directory locked against other runs.
     _lock: Option<File>,
-}
-
-/// The result of this process, if all processes succeed. Otherwise the first process that fails returns its failure, which the program tells. The
-/// others end without a word and with exit code 0, because a launcher kills all processes when it sees another code.
-fn agreed<R>(processes: &Processes, result: Result<R, Failure>) -> Result<R, Failure> {
-    let codes = processes.each(result.as_ref().err().map_or(0, Failure::code));
-    match codes.iter().position(|code| *code != 0) {
-        // Nothing is told of an interruption, which all processes have seen.
-        Some(first) if first != processes.rank() && codes[first] != INTERRUPTED => Err(Failure::Told(0)),
-        _ => result,
-    }
-}
-
-/// Refuses processes that start from another state, such as another checkpoint.
-fn check_start<const D: usize>(processes: &Processes, simulation: &Simulation<D>) -> Result<(), Failure> {
-    let positions: &[u8] = bytemuck::cast_slice(&simulation.particles.position);
-    let own = [simulation.clock.steps() as u32, crc32fast::hash(positions)];
-    match processes.first_other(own) {
-        None => Ok(()),
-        Some(rank) => Err(Failure::scene(format!(
-            "process {rank} starts from another state than process 0: its folder of the scene or of the results is not the same"
-        ))),
-    }
-}
-
-/// Refuses processes of another build, or on a processor that rounds otherwise.
-fn check_likeness(processes: &Processes) -> Result<(), Failure> {
-    if processes.count() == 1 {
-        return Ok(());
-    }
-    let own = format!("{:?} {}", Maker::here().build, lanes::rounds_once());
-    match processes.first_other(crc32fast::hash(own.as_bytes())) {
-        None => Ok(()),
-        Some(rank) => Err(Failure::scene(format!(
-            "process {rank} is another build than process 0, or its processor does not round a product and a sum in the same way: start all \
-             processes with one program, on machines of one kind"
-        ))),
-    }
-}
-
-/// Parser of an option that takes a whole number from `min` to `max`.
-pub(super) fn whole(min: u64, max: u64) -> impl Fn(&str) -> Result<u64, String> + Clone {
-    move |text| {
-        let number = text.parse().ok().filter(|number| (min..=max).contains(number));
-        number.ok_or_else(|| format!("must be a whole number from {min} to {max}"))
-    }
-}
-
-/// Parser of an option that takes a number.
-fn number(text: &str) -> Result<f64, String> {
-    text.parse().map_err(|_| "must be a number".to_owned())
 }
 
 /// Form of the progress on standard error.

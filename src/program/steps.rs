@@ -1,10 +1,11 @@
 //! The steps of a run.
 
+use super::agreement::check_step;
 use crate::checkpoint::Checkpoints;
 use crate::clock::Clock;
 use crate::output::Recorder;
-use crate::parallel::{Processes, in_pool};
-use crate::simulation::{AdvanceError, Simulation, StepReport};
+use crate::parallel::in_pool;
+use crate::simulation::{AdvanceError, Simulation};
 use std::error::Error;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -111,7 +112,7 @@ impl<const D: usize> Steps<D> {
             let simulation = &mut self.simulation;
             match in_pool(|| simulation.advance()) {
                 Ok(step) => {
-                    check_agreement(&processes, &step)?;
+                    check_step(&processes, &step)?;
                     written = self.write(|records, at| Ok(records.recorder.record(at, &step)?));
                 }
                 // The next round of the loop handles the interruption.
@@ -127,21 +128,5 @@ impl<const D: usize> Steps<D> {
         write: impl FnOnce(&mut Records<D>, &Simulation<D>) -> Result<(), Box<dyn Error>>,
     ) -> Result<(), Box<dyn Error>> {
         self.records.as_mut().map_or(Ok(()), |records| write(records, &self.simulation))
-    }
-}
-
-/// Processes that hold other numbers would take other decisions.
-///
-/// # Errors
-/// The residuals of a step do not have the same bits in all processes.
-fn check_agreement<const D: usize>(processes: &Processes, step: &StepReport<D>) -> Result<(), Box<dyn Error>> {
-    let last = step.newton.history.iterations.last();
-    match processes.first_other(last.map_or(0, |one| one.residual.to_bits())) {
-        None => Ok(()),
-        Some(rank) => Err(format!(
-            "process {rank} computes other numbers than process 0, perhaps with another processor or another mathematical library: start all \
-             processes on machines of one kind"
-        )
-        .into()),
     }
 }

@@ -2,17 +2,22 @@
 //! one that a launcher of MPI starts, where there is one.
 
 use crate::support::{Failure, Said, built, merged, said, scene, solid};
+use bfree::mechanics::check::direction;
+use bfree::mechanics::sweep::{Points, Supports, Weights};
 use bfree::parallel::{Exchange, Processes};
 use bfree::plan::{Plan, ProcessUse};
+use bfree::pooled::Pool;
 use bfree::simulation::{Simulation, StepReport};
+use bfree::tensor::Vector;
 use serde_json::json;
 use std::collections::BTreeMap;
+use std::convert::Infallible;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// The state and the report of a step, as bits.
 fn bits<const D: usize>(simulation: &Simulation<D>, step: &StepReport<D>) -> Vec<u64> {
@@ -146,7 +151,7 @@ fn a_step_that_fails_fails_in_all_processes() -> Result<(), Failure> {
     agree("halved steps", &start, &[2, 7], 2);
     start.particles.velocity.iter_mut().for_each(|v| *v *= 1e4);
     agree("out of the grid", &start, &[3], 1);
-    start.particles.velocity.fill(bfree::tensor::Vector::zeros());
+    start.particles.velocity.fill(Vector::zeros());
     start.particles.displacement_gradient[17][(0, 0)] = -1.5;
     agree("turned inside out", &start, &[3], 1);
     Ok(())
@@ -174,22 +179,34 @@ impl Exchange for Counted {
     }
 }
 
-/// Messages and bytes of a run are a property of the scene: a process tells its part of the nodes, and a little more at the interfaces.
+/// A scatter is one message. Each process tells the sums at its interior nodes and the entries at the interface, as `check --ranks` plans.
 #[test]
-fn a_product_tells_each_node_once() -> Result<(), Failure> {
+fn a_scatter_is_one_message_of_the_planned_length() -> Result<(), Failure> {
     let start = scene::<3>("block_static.json", &["grid.spacing=0.125"])?;
-    let nodes = start.next_step()?.nodes().len();
-    for count in [2, 4] {
-        let counts: Vec<Arc<[AtomicUsize; 2]>> = (0..count).map(|_| Arc::default()).collect();
-        let team = Processes::as_threads(count).into_iter().zip(&counts);
-        let team = team.map(|(one, counts)| Processes::new(Counted(one, counts.clone()))).collect();
-        assert!(runs(&start, team, 1).into_iter().all(|one| one.is_ok()));
-        let told: Vec<[usize; 2]> =
-            counts.iter().map(|one| [0, 1].map(|which| one[which].load(Ordering::Relaxed))).collect();
-        let bytes: usize = told.iter().map(|[_, bytes]| bytes).sum();
-        println!("{count} processes, {nodes} nodes: messages and bytes of each {told:?}");
-        assert!(told.iter().all(|[messages, _]| *messages == told[0][0]));
-        assert!(bytes > 0);
+    let (nodes, plan) = (start.next_step()?.nodes().len(), Plan::of(&start)?);
+    for count in [2, 3, 8] {
+        let told = |one: Processes| {
+            let counts: Arc<[AtomicUsize; 2]> = Arc::default();
+            let processes = Processes::new(Counted(one, counts.clone()));
+            let points = Points { processes, ..Points::at(&start.particles.position) };
+            let (approximation, pool) = (&start.approximation, Pool::default());
+            let (supports, _) = Supports::rebuilt(None, approximation, &start.grid, &points, &pool).unwrap();
+            counts.iter().for_each(|one| one.store(0, Ordering::Relaxed));
+            let mut force = vec![Vector::zeros(); nodes];
+            let unit = |_, u, l| Ok::<_, Infallible>((u, l));
+            supports.assemble(&direction::<3>(nodes, 1), Weights::Signed, &mut force, unit).unwrap();
+            [0, 1].map(|which| counts[which].load(Ordering::Relaxed))
+        };
+        let all = thread::scope(|scope| {
+            let told = &told;
+            let team: Vec<_> =
+                Processes::as_threads(count).into_iter().map(|one| scope.spawn(move || told(one))).collect();
+            team.into_iter().map(|one| one.join().unwrap()).collect::<Vec<_>>()
+        });
+        assert!(all.iter().all(|[messages, _]| *messages == 1), "{count} processes: {all:?}");
+        let most = all.iter().map(|[_, bytes]| *bytes as u64).max();
+        assert_eq!(most, Some(ProcessUse::of(&start, &plan, count)?.told), "{count} processes: {all:?}");
+        assert!(all.iter().map(|[_, bytes]| bytes).sum::<usize>() > 24 * nodes, "{count} processes: {all:?}");
     }
     Ok(())
 }
@@ -309,6 +326,11 @@ fn a_process_that_ends_ends_all() -> Result<(), Failure> {
             signal(name, which, &out)?;
             let code = child.wait()?.code();
             assert!(code != Some(0), "{launcher:?} {name} {which}: {code:?}");
+            // The launcher may end a moment before the processes that it kills.
+            let end = Instant::now() + Duration::from_secs(10);
+            while !writing_to(&out).is_empty() && Instant::now() < end {
+                thread::sleep(Duration::from_millis(20));
+            }
             assert_eq!(writing_to(&out), Vec::<u32>::new(), "{launcher:?} {name} {which}");
             let (code, _, told) = said(&mut launched(&launcher, 2, &[&run[..], &["--restart"]].concat()))?;
             assert_eq!(code, Some(0), "{launcher:?} {name} {which}: {told}");

@@ -29,7 +29,8 @@ impl Debug for Foreign {
 }
 
 impl Foreign {
-    /// Keeps what the shape functions of the particles `keys` depend on, in the order of the keys, because particles may be moved in memory.
+    /// Keeps the positions of the particles `keys`, on which shape functions depend. The positions lie in the order of the keys, because the step may
+    /// move particles in memory.
     pub(super) fn new<A: ShapeFunction, const D: usize>(
         approximation: &A,
         grid: &Grid<D>,
@@ -57,7 +58,7 @@ impl Foreign {
         Self { build: Box::new(build), blocks: (0..blocks).map(|_| OnceLock::new()).collect() }
     }
 
-    /// The block with this number and these particles. `known` is what this process knows of it.
+    /// The block with this number and these particles. `known` is the same block without shape functions.
     pub(super) fn block(&self, number: usize, keys: &[Key], known: &Block) -> &Block {
         self.blocks[number].get_or_init(|| {
             let mut block = Block::default();

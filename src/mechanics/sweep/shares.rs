@@ -10,15 +10,15 @@ use crate::pooled::Pool;
 use std::iter;
 use std::ops::Range;
 
-/// The processes that share the passes, and what each of them tells the others after a scatter.
+/// The blocks of each process, and the nodes whose sums or entries it tells the others after a scatter.
 #[derive(Debug)]
 pub(super) struct Shares {
     pub(super) processes: Processes,
     /// The first block of each process; at the end, the number of blocks.
     bounds: Vec<usize>,
-    /// The interior nodes of all processes, one process after the other, and their numbers.
+    /// The interior nodes of all processes, one process after the other, and how many each process has.
     interior: (Vec<u32>, Vec<usize>),
-    /// The interface nodes of all blocks, one block after the other, and their numbers by process.
+    /// The interface nodes of all blocks, one block after the other, and how many each process has.
     interface: (Vec<u32>, Vec<usize>),
     /// Every interface node, once.
     distinct: Vec<u32>,
