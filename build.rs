@@ -1,9 +1,9 @@
-//! Programs of this package export their functions, so that a law finds the utility routines of Abaqus in the program that loads it. Cargo also
-//! unifies the features in `build-dependencies` only for packages with a build script.
+//! Programs of this package export the utility routines of Abaqus, as those of tangent-check do, so that a law finds them in the program that loads
+//! it. Cargo also unifies the features in `build-dependencies` only for packages with a build script.
 
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");
-    if std::env::var("CARGO_CFG_UNIX").is_ok() {
-        println!("cargo::rustc-link-arg=-rdynamic");
+    if let Ok(argument) = std::env::var("DEP_TANGENT_CHECK_LINK_ARGUMENT") {
+        println!("cargo::rustc-link-arg={argument}");
     }
 }

@@ -1,5 +1,5 @@
 //! The utility routines of Abaqus that UMATs call. A library leaves them undefined, and the loader finds them in the program that loads it: the
-//! program exports them (`-rdynamic`, see `build.rs`).
+//! program exports those that `utilities.list` names (see `build.rs`).
 //!
 //! Source: Abaqus User Subroutines Reference Guide, "Utility routines". Names are those of gfortran and ifort on Linux and macOS; arguments are
 //! addresses; the lengths of texts follow behind all others by value.
@@ -251,6 +251,18 @@ extern "C" fn MutexUnlock(id: c_int) {
 mod tests {
     use super::*;
     use crate::tensor::rotation_about;
+
+    /// A routine that the list does not name is not found by a law.
+    #[test]
+    fn the_list_names_every_routine() {
+        let listed: Vec<&str> =
+            include_str!("utilities.list").lines().filter_map(|line| line.trim().strip_suffix(";")).collect();
+        let after = include_str!("utilities.rs").split("#[unsafe(no_mangle)]\n").skip(1);
+        let routines: Vec<&str> =
+            after.filter_map(|text| text.split_once("fn ")?.1.split_once('(')).map(|(name, _)| name).collect();
+        assert_eq!(listed.strip_suffix(&["}"]).unwrap_or(&listed), routines);
+        assert_eq!(routines.len(), ROUTINES.0.len());
+    }
 
     /// SINV, SPRINC, SPRIND and ROTSIG in three dimensions, plane strain and plane stress, for stresses and strains: the values and directions
     /// give the tensor back, the invariants are those of the principal values, and a rotation keeps them.

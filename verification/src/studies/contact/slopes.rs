@@ -100,8 +100,7 @@ pub(super) fn reports(effort: &Effort) -> Result<Vec<Report>, StudyError> {
         "random blocks below 0.99 of Coulomb's limit, one second after the load is on",
         &["seed", "quantity"],
     );
-    let mut slide =
-        Report::new("random blocks above 1.01 of Coulomb's limit: error of the acceleration over g sin θ", &["seed"]);
+    let mut slide = Report::new("random blocks above 1.01 of Coulomb's limit, over g sin θ", &["seed", "quantity"]);
     let resting = |seed: u64| {
         let mut random = Random::new(seed);
         let used = random.between(0.3, 0.99);
@@ -123,7 +122,7 @@ pub(super) fn reports(effort: &Effort) -> Result<Vec<Report>, StudyError> {
         Ok::<_, StudyError>((seed.to_string(), (run.acceleration - block.acceleration).abs() / of_slope))
     };
     for (name, error) in (1..=sliding_count).into_par_iter().map(sliding).collect::<Result<Vec<_>, _>>()? {
-        slide.push(&[&name], error, Bound::AtMost(0.02));
+        slide.push(&[&name, "error of the acceleration"], error, Bound::AtMost(0.02));
     }
     rest.note("Bounds: issue 52 of the project.");
     slide.note("Bound: issue 52 of the project. A sliding block of an elastic solid flutters without damping (the manual, obstacles.md).");

@@ -157,6 +157,8 @@ fn attempt(programs: &Programs, check: Check, fault: Option<&str>) -> Result<Ver
     command.args(arguments).current_dir(root());
     command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
     command.env_remove(VARIABLE).envs(fault.map(|fault| (VARIABLE, fault)));
+    // Checks run side by side; the results do not depend on the number of threads, and tests of threads start their own.
+    command.env("RAYON_NUM_THREADS", "1");
     // Inputs that a fault fails on are no regressions, and do not belong beside the sources.
     command.env("PROPTEST_DISABLE_FAILURE_PERSISTENCE", "true");
     let failed = |source| ShippedFaultError::Start { command: format!("{}", program.display()), source };
