@@ -65,11 +65,13 @@ pub(crate) fn see<const D: usize>(
 impl std::fmt::Display for Touched {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self { name, since, until, largest_force, largest_at, largest_depth, work, friction_loss, .. } = self;
+        // Forces between bodies are internal.
+        let work = if *work == 0.0 { String::new() } else { format!(", work {work:.6e}") };
         let [since, until, largest_at] = [since, until, largest_at].map(|time| rounded(*time));
         write!(
             f,
             "{name:?} touched from t = {since} to {until}: largest force {largest_force:.6e} at t = {largest_at}, largest depth \
-             {largest_depth:.3e}, work {work:.6e}, friction loss {friction_loss:.6e}"
+             {largest_depth:.3e}{work}, friction loss {friction_loss:.6e}"
         )
     }
 }

@@ -32,6 +32,9 @@ const MIN_CELLS_ACROSS: f64 = 2.0;
 /// of two cells gets no warning.
 const THICKNESS_TOLERANCE: f64 = 0.95;
 
+/// The largest distance of points of surfaces, in spacings.
+const MOST_APART: f64 = 0.5;
+
 /// Poisson's ratio from which on a body with pointwise dilatation is said to lock.
 const LOCKING_POISSON: f64 = 0.45;
 
@@ -44,8 +47,8 @@ struct Bodies<'a, const D: usize> {
 }
 
 impl Scene {
-    /// Warnings about a simulation of this scene: overlapping bodies, coincident particles, locking, prescribed regions without nodes, and
-    /// tractions on surfaces of pixels. Further warnings are about bodies too thin for the grid, or with another volume than their shape.
+    /// Warnings about a simulation of this scene: overlapping bodies, coincident particles, locking, prescribed regions without nodes, narrow
+    /// obstacles, and tractions on surfaces of pixels. Further warnings are about bodies too thin for the grid, or with another volume than their shape.
     /// The thickness of a union is that of one part.
     ///
     /// ```
@@ -88,7 +91,8 @@ impl Scene {
         let moving = simulation.loads.contacts.obstacles.iter().map(Obstacle::moves);
         all.extend(self.obstacles.iter().zip(moving).enumerate().filter_map(|(i, (obstacle, moves))| {
             let shape = obstacle.shape.build()?;
-            obstacle.warning(&format!("obstacles[{i}]"), !moves && apart(grid, &shape))
+            let path = format!("obstacles[{i}]");
+            obstacle.warning(&path, !moves && apart(grid, &shape)).or_else(|| narrow(&path, &shape, grid.spacing))
         }));
         let loaded = self.tractions.iter().zip(&simulation.loads.surface).enumerate();
         all.extend(loaded.filter_map(|(i, (traction, load))| {
@@ -125,6 +129,18 @@ impl Scene {
 fn apart<const D: usize>(grid: &Grid<D>, shape: &Shape<D>) -> bool {
     let ((min, max), end) = (shape.bounding_box(), grid.position(grid.cells));
     (0..D).any(|k| max[k] < grid.origin[k] || min[k] > end[k])
+}
+
+/// Warns of an obstacle that is narrower than the distance of surface points.
+fn narrow<const D: usize>(path: &str, shape: &Shape<D>, spacing: f64) -> Option<String> {
+    let ((min, max), apart) = (shape.bounding_box(), MOST_APART * spacing);
+    let width = (0..D).map(|k| max[k] - min[k]).fold(f64::INFINITY, f64::min);
+    (width < apart).then(|| {
+        format!(
+            "{path} is {width:.3e} wide, and points of surfaces are up to {apart:.3e} apart: an end or a corner of it between two points is not \
+             felt, and a body that presses it by half of its width goes through; make it wider, or lower grid.spacing"
+        )
+    })
 }
 
 impl<const D: usize> Bodies<'_, D> {

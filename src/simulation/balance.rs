@@ -63,7 +63,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             phi[dof.node][dof.component] = theta * dof.step.increment;
         }
         phi.iter_mut().zip(&nodal.motion).for_each(|(phi, before)| *phi += before);
-        self.meet_obstacles(&equilibrium, prescribed, &mut phi)?;
+        self.meet_what_holds(&equilibrium, prescribed, &mut phi)?;
         let mut preconditioner = self.preconditioner().0.build::<D>();
         let (mut cosine, mut dilatation) = (None, [Vec::new(), Vec::new()]);
         let newton = if scheme.follows_path() && !self.history.resets_grid() {
@@ -141,7 +141,12 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             )
         };
         let law = self.bodies.iter().find(outside).map(law);
-        let all: Vec<String> = is_static.then_some(load).into_iter().chain(law).collect();
+        let touch = (is_static && self.loads.contacts.between.is_some()).then(|| {
+            "a body that only other bodies hold has no stiffness until it touches them: let them overlap by a thousandth of grid.spacing at \
+             the start, hold what may slide away, or take a smaller contact.stiffness"
+                .to_owned()
+        });
+        let all: Vec<String> = is_static.then_some(load).into_iter().chain(touch).chain(law).collect();
         (!all.is_empty()).then(|| all.join("; "))
     }
 

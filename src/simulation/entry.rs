@@ -16,9 +16,9 @@ const DEEPEST_ENTRY: f64 = 0.25;
 /// A particle that lies deeper in an obstacle or another body than all points of surfaces, by this many spacings, becomes a point of the surface.
 const DEEPER: f64 = 0.01;
 
-/// The path of a point in a step is tested for obstacles at places this far apart, in spacings, and at this many places at most.
-const SAMPLED: f64 = 0.05;
-const MOST_SAMPLES: f64 = 1000.0;
+/// The path of a point in a step is followed from place to place, each as far as the distance of the obstacle allows, and at least this part of the
+/// path. So an obstacle thinner than this part may be missed.
+const LEAST_STRIDE: f64 = 1e-3;
 
 impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// Refuses a step in which surfaces enter obstacles or bodies too deeply, or go through them.
@@ -169,23 +169,30 @@ struct Swept<const D: usize> {
 /// The depth, in spacings, of a point that enters an obstacle too deeply or goes through it; `None` for an allowed motion. The point moves
 /// straight between two positions in the frame of the obstacle.
 fn entry<const D: usize>(shape: &Shape<D>, [start, end]: &[Vector<f64, D>; 2], h: f64) -> Option<f64> {
-    let length = (end - start).norm();
+    let motion = end - start;
+    let length = motion.norm();
     let before = shape.signed_distance(start);
     // A positive distance is at most the distance of the surface. NaN stays outside.
     if before >= length || before.is_nan() {
         return None;
     }
     let (after, normal) = shape.distance_and_normal(end);
-    let depth = -after / h;
+    let depth = (-after / h).max(0.0);
+    // The side at which the point leaves is behind the one at which it enters.
+    let is_behind = normal.dot(&motion) > 0.0;
+    mutant!("obstacles: a point may come out behind a thin obstacle": is_behind = false);
     if before < 0.0 {
-        let turned = after < 0.0 && shape.normal(start).dot(&normal) < 0.0;
-        return turned.then_some(depth);
+        let outward = shape.normal(start);
+        return (is_behind && outward.dot(&motion) < 0.0 && outward.dot(&normal) < 0.0).then_some(depth);
     }
-    if depth > DEEPEST_ENTRY {
-        return Some(depth);
+    if after < 0.0 {
+        return (depth > DEEPEST_ENTRY || is_behind).then_some(depth);
     }
-    let samples = (length / (SAMPLED * h)).ceil().min(MOST_SAMPLES);
-    let at = |sample: f64| shape.signed_distance(&(start + (end - start) * (sample / samples)));
-    let deepest = (1..samples as u32).map(|sample| at(f64::from(sample))).fold(0.0, f64::min);
-    (after >= 0.0 && deepest < 0.0).then_some(-deepest / h)
+    // Both ends are outside.
+    let (mut at, mut distance) = (0.0, before);
+    while at < 1.0 && distance >= 0.0 {
+        at += (distance / length).max(LEAST_STRIDE);
+        distance = shape.signed_distance(&(start + motion * at.min(1.0)));
+    }
+    (distance < 0.0).then_some(-distance / h)
 }

@@ -214,7 +214,7 @@ pub enum StepError {
     /// A point of a body enters an obstacle too deeply in one step.
     #[error(
         "the point of a body at {position:?} enters the obstacle {obstacle:?} by {depth:.2} grid spacings in one step, or goes through: take \
-         shorter steps, a stiffer contact (obstacles[].stiffness), or a thicker obstacle"
+         shorter steps, a stiffer contact (obstacles[].stiffness), or a thicker obstacle; parts of a union must overlap"
     )]
     EntersObstacle {
         /// Name of the obstacle.

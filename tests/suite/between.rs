@@ -336,6 +336,47 @@ fn load_steps_carry_contact_to_a_new_grid_and_over_a_restart() -> Result<(), Fai
     Ok(())
 }
 
+/// Three blocks lie on each other with gaps of zero, in any order of the list, in one load step. Each carries the weight of those above it.
+#[test]
+fn blocks_that_lie_on_each_other_find_their_equilibrium_in_load_steps() -> Result<(), Failure> {
+    let boxes = [([0.0, 0.0], [1.1, 0.9]), ([0.1, 0.9], [1.0, 1.6]), ([0.2, 1.6], [0.9, 2.2])];
+    let weight = |k: usize| 1e4 * (boxes[k].1[0] - boxes[k].0[0]) * (boxes[k].1[1] - boxes[k].0[1]);
+    for (order, floor) in [([0, 1, 2], true), ([2, 1, 0], true), ([1, 2, 0], false)] {
+        let body = |k: usize| {
+            let (min, max) = boxes[k];
+            solid(&k.to_string(), 1000, json!({ "box": { "min": min, "max": max } }))
+        };
+        let held = if floor {
+            json!({ "boundary": { "bottom": "fixed" } })
+        } else {
+            json!({ "obstacles": [{ "name": "floor", "friction": 0.5, "stiffness": 0.3, "shape": { "half_space": { "point": [0, 0], "normal": [0, 1] } } }] })
+        };
+        let mut simulation: Simulation<2> = built(&merged(
+            json!({
+                "grid": { "origin": [-1, if floor { 0.0 } else { -0.5 }], "size": [4, 5], "spacing": 0.25 },
+                "time": { "scheme": "none", "step": 1, "end": 1 },
+                "bodies": order.map(body),
+                "gravity": { "acceleration": [0, -10] },
+                "contact": { "friction": 0.5, "stiffness": 0.3 }
+            }),
+            held,
+        ))?;
+        let step = simulation.advance()?;
+        let pairs = &simulation.loads.contacts.between.as_ref().ok_or("no pairs")?.pairs;
+        for (pair, contact) in pairs.iter().zip(&step.pairs) {
+            let [low, high] = [0, 1].map(|k| order[pair.bodies[k] as usize]);
+            let (low, high) = (low.min(high), low.max(high));
+            let carried = if high - low == 1 { (high..3).map(weight).sum() } else { 0.0 };
+            assert!(
+                (contact.force[1].abs() - carried).abs() < 1e-5 * weight(0),
+                "{order:?} {low} {high}: {}",
+                contact.force
+            );
+        }
+    }
+    Ok(())
+}
+
 #[test]
 fn every_body_meets_held_nodes_and_walls_whatever_its_place_in_the_list() -> Result<(), Failure> {
     let block = |name: &str, x: f64, speed: [f64; 2]| {

@@ -150,6 +150,39 @@ fn a_body_does_not_pass_a_thin_obstacle_silently() -> Result<(), Failure> {
     Ok(())
 }
 
+/// A block that a wall thinner than the depth of contact cannot hold turns back, or the run ends. In no step is it behind the wall. The steps are
+/// from 0.005 to 0.4 spacings long, in dynamics and in load steps.
+#[test]
+fn a_body_does_not_come_out_behind_a_wall_that_is_thinner_than_a_step() -> Result<(), Failure> {
+    let block =
+        merged(solid("block", 1000, json!({ "box": { "min": [0, 0], "max": [1, 1] } })), json!({ "velocity": [1, 0] }));
+    let mut ended = 0;
+    for (thickness, step) in
+        [(2e-4, 0.01), (5e-4, 0.005), (0.002, 0.005), (0.002, 0.05), (0.004, 0.01), (0.006, 0.02), (0.02, 0.005)]
+    {
+        for approximation in [json!("linear"), json!("gimp"), json!({ "bspline": { "degree": 3 } })] {
+            let scene = json!({
+                "grid": { "origin": [-2, -1], "size": [6, 3], "spacing": 0.125 },
+                "approximation": approximation,
+                "time": { "step": step, "end": 0.5, "max_halvings": 3 },
+                "bodies": [block],
+                "obstacles": [{ "name": "wall", "shape": { "box": { "min": [1.05, -0.5], "max": [1.05 + thickness, 1.5] } } }]
+            });
+            let mut simulation: Simulation<2> = built(&scene)?;
+            while simulation.clock.time() < 0.5 - 1e-9 {
+                if simulation.advance().is_err() {
+                    ended += 1;
+                    break;
+                }
+            }
+            let front = simulation.particles.position.iter().map(|x| x[0]).fold(0.0, f64::max);
+            assert!(front < 1.05 + thickness, "{thickness} {step} {approximation}: {front}");
+        }
+    }
+    assert!(ended > 0);
+    Ok(())
+}
+
 #[test]
 fn a_turned_scene_has_turned_forces() -> Result<(), Failure> {
     // The same impact on a floor and on a wall: x and y are exchanged. Newton's method must not end at different residuals.

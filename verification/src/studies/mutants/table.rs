@@ -133,6 +133,7 @@ pub(super) const FAULTS: &[ShippedFault] = &[
     fault("obstacle: it rests", OBSTACLES, LAWS),
     fault("obstacles: the state of friction is not kept", OBSTACLES, LAWS),
     fault("obstacles: a point may enter deeply in one step", OBSTACLES, LAWS),
+    fault("obstacles: a point may come out behind a thin obstacle", OBSTACLES, LAWS),
     fault("obstacles: the forces at the start of a step do no work", OBSTACLES, LAWS),
     fault("loads: a traction has the other sign", LOADS, TANGENT),
     fault("loads: the tangent of a pressure has a wrong sign", TANGENT, DYNAMICS),
