@@ -340,7 +340,7 @@ fn load_steps_carry_contact_to_a_new_grid_and_over_a_restart() -> Result<(), Fai
 #[test]
 fn blocks_that_lie_on_each_other_find_their_equilibrium_in_load_steps() -> Result<(), Failure> {
     let boxes = [([0.0, 0.0], [1.1, 0.9]), ([0.1, 0.9], [1.0, 1.6]), ([0.2, 1.6], [0.9, 2.2])];
-    let weight = |k: usize| 1e4 * (boxes[k].1[0] - boxes[k].0[0]) * (boxes[k].1[1] - boxes[k].0[1]);
+    let weight = |k: usize| 10.0 * (boxes[k].1[0] - boxes[k].0[0]) * (boxes[k].1[1] - boxes[k].0[1]);
     for (order, floor) in [([0, 1, 2], true), ([2, 1, 0], true), ([1, 2, 0], false)] {
         let body = |k: usize| {
             let (min, max) = boxes[k];
