@@ -17,6 +17,21 @@ pub fn available() -> Option<u64> {
     [of_machine, of_group, of_shell].into_iter().flatten().min()
 }
 
+/// Gives the memory that the program has freed back to the operating system. glibc keeps what one thread has freed for that thread: after the set-up
+/// of 512,000 particles, 100 MiB.
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+#[allow(unsafe_code)]
+pub(crate) fn give_back() {
+    unsafe extern "C" {
+        safe fn malloc_trim(keep: usize) -> std::ffi::c_int;
+    }
+    malloc_trim(0);
+}
+
+/// Other systems give freed memory back by themselves.
+#[cfg(not(all(target_os = "linux", target_env = "gnu")))]
+pub(crate) fn give_back() {}
+
 /// `Max address space` of /proc/self/limits less `VmSize` of /proc/self/status, in bytes.
 fn address_space(limits: &str, status: &str) -> Option<u64> {
     let used = number_after(status, "VmSize:")?.saturating_mul(1024);

@@ -9,6 +9,7 @@ use super::provenance::{Command, Provenance};
 use super::scene_arguments::{SceneArguments, what_accuracy_sets};
 use super::steps::{Records, Schedule, Steps};
 use crate::checkpoint::{self, Checkpoints, Identity, Restored};
+use crate::memory;
 use crate::output::plot::{Look, plot_run};
 use crate::output::{Audience, Outcome, OutputSettings, Recorder, Reference, Summary};
 use crate::parallel::{self, Processes};
@@ -139,6 +140,7 @@ impl Run {
             0 => self.prepared::<D>(scene, start),
             _ => self.prepared_without_records::<D>(scene),
         };
+        memory::give_back();
         let Prepared { mut steps, inputs, warnings, directory, _lock } = agreed(processes, prepared)?;
         agreed(processes, check_start(processes, &steps.simulation))?;
         let (settings, asked_to_stop) = (&mut steps.simulation.settings, steps.interrupted.clone());

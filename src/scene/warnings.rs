@@ -94,6 +94,7 @@ impl Scene {
             let path = format!("obstacles[{i}]");
             obstacle.warning(&path, !moves && apart(grid, &shape)).or_else(|| narrow(&path, &shape, grid.spacing))
         }));
+        all.extend(seam(&simulation.loads.contacts.obstacles, grid.spacing));
         let loaded = self.tractions.iter().zip(&simulation.loads.surface).enumerate();
         all.extend(loaded.filter_map(|(i, (traction, load))| {
             let body = self.bodies.iter().find(|body| body.name == traction.body)?;
@@ -141,6 +142,50 @@ fn narrow<const D: usize>(path: &str, shape: &Shape<D>, spacing: f64) -> Option<
              felt, and a body that presses it by half of its width goes through; make it wider, or lower grid.spacing"
         )
     })
+}
+
+/// Warns of two parts of a union, or of two obstacles at rest, that touch along a face.
+fn seam<const D: usize>(obstacles: &[Obstacle<D>], spacing: f64) -> Option<String> {
+    let parts = |(number, obstacle): (usize, &'_ Obstacle<D>)| {
+        let parts =
+            if let Shape::Union(union) = &obstacle.shape { union.0.clone() } else { vec![obstacle.shape.clone()] };
+        parts.into_iter().map(|part| (number, part)).collect::<Vec<_>>()
+    };
+    let parts: Vec<_> = obstacles.iter().enumerate().flat_map(parts).collect();
+    for (i, (one, of_one)) in parts.iter().enumerate() {
+        for (other, of_other) in &parts[i + 1..] {
+            let rest = [one, other].iter().all(|&&number| !obstacles[number].moves());
+            if (one == other || rest)
+                && let Some(x) = common_face(of_one, of_other, spacing)
+            {
+                let names = [one, other].map(|&number| &obstacles[number].name);
+                let whose = if one == other {
+                    format!("parts of obstacle {:?}", names[0])
+                } else {
+                    format!("obstacles {names:?}")
+                };
+                return Some(format!(
+                    "{whose} touch along a face at {:?}: a point of a body near this seam is pushed along it; make them one union whose parts \
+                     overlap by half of grid.spacing or more",
+                    x.as_slice()
+                ));
+            }
+        }
+    }
+    None
+}
+
+/// The middle of the face along which two solids touch without overlap. Both surfaces pass through the middle of the face that their boxes have in
+/// common, and through a place beside it.
+fn common_face<const D: usize>(one: &Shape<D>, other: &Shape<D>, spacing: f64) -> Option<Vector<f64, D>> {
+    let [(a, b), (c, d)] = [one, other].map(Shape::bounding_box);
+    let (low, high) = (a.sup(&c), b.inf(&d));
+    let round_off = EDGE * spacing;
+    let flat = (0..D).filter(|&k| (high[k] - low[k]).abs() <= round_off).count();
+    let meets = (0..D).all(|k| high[k] >= low[k] - round_off);
+    let at = |part: f64| low + (high - low) * part;
+    let on_both = |x: Vector<f64, D>| [one, other].iter().all(|shape| shape.signed_distance(&x).abs() <= round_off);
+    (flat == 1 && meets && on_both(at(0.5)) && on_both(at(0.3))).then(|| at(0.5))
 }
 
 impl<const D: usize> Bodies<'_, D> {

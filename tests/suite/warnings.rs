@@ -170,6 +170,34 @@ fn deprecated_keys_are_read_and_named() -> Result<(), Failure> {
 }
 
 #[test]
+fn narrow_obstacles_and_seams_are_named() -> Result<(), Failure> {
+    let of = |obstacles: Value| {
+        warnings(json!([block("a", [2.0, 4.0], [5.0, 7.0])]), json!({ "obstacles": obstacles }), Path::new("."))
+    };
+    let rect = |min: [f64; 2], max: [f64; 2]| json!({ "box": { "min": min, "max": max } });
+    let (left, right) = (rect([0.0, 1.0], [4.0, 2.0]), rect([4.0, 0.0], [8.0, 2.5]));
+    let union = |parts: [&Value; 2]| json!([{ "name": "floor", "shape": { "union": parts } }]);
+    assert_one(&of(union([&left, &right]))?, &["parts of obstacle \"floor\" touch along a face at [4.0, 1.5]"]);
+    let apart = json!([{ "name": "l", "shape": left }, { "name": "r", "shape": right }]);
+    assert_one(&of(apart)?, &["obstacles [\"l\", \"r\"] touch along a face", "one union"]);
+    // Parts that overlap, that touch at a corner or in a point, and obstacles that move.
+    let disc = |x: f64| json!({ "ball": { "center": [x, 2.0], "radius": 1.0 } });
+    let moving = json!([{ "name": "l", "shape": left }, { "name": "r", "shape": right, "velocity": [[0, [0, 0.1]]] }]);
+    for sound in [
+        union([&rect([0.0, 1.0], [4.5, 2.0]), &right]),
+        union([&rect([0.0, 1.0], [4.0, 2.0]), &rect([4.0, 2.0], [8.0, 3.0])]),
+        union([&disc(2.0), &disc(4.0)]),
+        moving,
+    ] {
+        assert_eq!(of(sound)?, Vec::<String>::new());
+    }
+    let pin = |width: f64| json!([{ "name": "pin", "shape": rect([4.0, 0.0], [4.0 + width, 3.0]) }]);
+    assert_one(&of(pin(0.4))?, &["obstacles[0] is 4.000e-1 wide", "5.000e-1 apart", "goes through"]);
+    assert_eq!(of(pin(0.5))?, Vec::<String>::new());
+    Ok(())
+}
+
+#[test]
 fn shipped_scenes_are_sound_and_have_nothing_to_warn_of() -> Result<(), Failure> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
     let mut names = Vec::new();
