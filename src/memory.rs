@@ -28,7 +28,7 @@ pub(crate) fn give_back() {
     malloc_trim(0);
 }
 
-/// Other systems give freed memory back by themselves.
+/// Other systems have no such call.
 #[cfg(not(all(target_os = "linux", target_env = "gnu")))]
 pub(crate) fn give_back() {}
 

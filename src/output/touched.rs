@@ -65,7 +65,7 @@ pub(crate) fn see<const D: usize>(
 impl std::fmt::Display for Touched {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self { name, since, until, largest_force, largest_at, largest_depth, work, friction_loss, .. } = self;
-        // Forces between bodies are internal.
+        // Neither an obstacle at rest nor forces between bodies do work.
         let work = if *work == 0.0 { String::new() } else { format!(", work {work:.6e}") };
         let [since, until, largest_at] = [since, until, largest_at].map(|time| rounded(*time));
         write!(

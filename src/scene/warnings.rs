@@ -139,7 +139,7 @@ fn narrow<const D: usize>(path: &str, shape: &Shape<D>, spacing: f64) -> Option<
     (width < apart).then(|| {
         format!(
             "{path} is {width:.3e} wide, and points of surfaces are up to {apart:.3e} apart: an end or a corner of it between two points is not \
-             felt, and a body that presses it by half of its width goes through; make it wider, or lower grid.spacing"
+             felt, and the run ends where a body presses it by half of its width; make it wider, or lower grid.spacing"
         )
     })
 }
@@ -165,7 +165,7 @@ fn seam<const D: usize>(obstacles: &[Obstacle<D>], spacing: f64) -> Option<Strin
                     format!("obstacles {names:?}")
                 };
                 return Some(format!(
-                    "{whose} touch along a face at {:?}: a point of a body near this seam is pushed along it; make them one union whose parts \
+                    "{whose} touch along a face at {:?}: a point of a body near this seam is pushed sideways; make them one union whose parts \
                      overlap by half of grid.spacing or more",
                     x.as_slice()
                 ));

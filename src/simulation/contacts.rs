@@ -145,7 +145,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     }
 
     /// The position of each candidate relative to the other body, at both ends of the step.
-    fn relative_motions(&self, step: &Step<'_, D, L>, phi: &[Vector<f64, D>]) -> Vec<[Vector<f64, D>; 2]> {
+    pub(super) fn relative_motions(&self, step: &Step<'_, D, L>, phi: &[Vector<f64, D>]) -> Vec<[Vector<f64, D>; 2]> {
         let (contacts, reference) = (&self.loads.contacts, self.particles.reference().position);
         let candidates = contacts.between.iter().flat_map(|between| &between.candidates);
         let of = |one: &Candidate<D>| {
@@ -156,7 +156,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     }
 
     /// The positions of all particles at the end of the step.
-    fn end_positions(&self, step: &Step<'_, D, L>, phi: &[Vector<f64, D>]) -> Vec<Vector<f64, D>> {
+    pub(super) fn end_positions(&self, step: &Step<'_, D, L>, phi: &[Vector<f64, D>]) -> Vec<Vector<f64, D>> {
         let mut positions = self.particles.reference().position.to_vec();
         positions.iter_mut().zip(&*step.supports.values(phi)).for_each(|(x, u)| *x += u);
         positions

@@ -178,7 +178,7 @@ fn entry<const D: usize>(shape: &Shape<D>, [start, end]: &[Vector<f64, D>; 2], h
     }
     let (after, normal) = shape.distance_and_normal(end);
     let depth = (-after / h).max(0.0);
-    // The side at which the point leaves is behind the one at which it enters.
+    // The side nearest to the end pushes the point on along its motion: it is the back of the obstacle.
     let is_behind = normal.dot(&motion) > 0.0;
     mutant!("obstacles: a point may come out behind a thin obstacle": is_behind = false);
     if before < 0.0 {

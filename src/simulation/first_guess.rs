@@ -3,10 +3,10 @@
 use super::{InitialGuess, Simulation, StepError};
 use crate::approximation::ShapeFunction;
 use crate::material::Law;
-use crate::mechanics::contact::Carrier;
 use crate::mechanics::loads::{Candidate, Pose, PrescribedDof};
 use crate::mechanics::residual::Equilibrium;
 use crate::mechanics::sweep::Supports;
+use crate::mechanics::terms::Step;
 use crate::mechanics::transfer::Nodal;
 use crate::pooled::Pooled;
 use crate::tensor::Vector;
@@ -78,7 +78,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         };
         // After each motion, bodies touch an obstacle or others, so there are fewer that move.
         for _ in 0..=supports.field_count() {
-            let (places, faced) = (self.surfaces(supports, phi), self.faced(supports, phi));
+            let (places, faced) = (self.surfaces(&equilibrium.step, phi), self.faced(&equilibrium.step, phi));
             let of =
                 |fields: &[u32]| fields.iter().flat_map(|&field| &places[field as usize]).copied().collect::<Vec<_>>();
             let mut apart = together(supports.field_count(), &faced);
@@ -104,9 +104,8 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     }
 
     /// The positions of the points of surfaces after the nodal motion `phi`, by nodal fields.
-    fn surfaces(&self, supports: &Supports<D>, phi: &[Vector<f64, D>]) -> Vec<Vec<Vector<f64, D>>> {
-        let mut positions = self.particles.reference().position.to_vec();
-        positions.iter_mut().zip(&*supports.values(phi)).for_each(|(x, u)| *x += u);
+    fn surfaces(&self, step: &Step<'_, D, L>, phi: &[Vector<f64, D>]) -> Vec<Vec<Vector<f64, D>>> {
+        let (supports, positions) = (step.supports, self.end_positions(step, phi));
         let mut places = vec![Vec::new(); supports.field_count() as usize];
         for p in self.loads.contacts.points.iter().map(|point| point.particle) {
             places[supports.field_of(self.particles.body[p]) as usize].push(positions[p]);
@@ -115,18 +114,14 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     }
 
     /// The points that face another body, after the nodal motion `phi`.
-    fn faced(&self, supports: &Supports<D>, phi: &[Vector<f64, D>]) -> Vec<Faced<D>> {
-        let (contacts, reference) = (&self.loads.contacts, self.particles.reference().position);
-        let candidates = contacts.between.iter().flat_map(|between| &between.candidates);
-        let of = |one: &Candidate<D>| {
-            let carriers = one.carriers(contacts);
-            let position = |carrier: &Carrier<D>| carrier.position(reference, supports, phi) * carrier.share;
-            let relative: Vector<f64, D> = carriers.iter().map(position).sum();
-            let field = |carrier: Option<&Carrier<D>>| Some(supports.field_of(self.particles.body[carrier?.particle]));
-            let fields = [field(carriers.first())?, field(carriers.last())?];
-            Some(Faced { fields, normal: one.normal, gap: one.normal.dot(&relative) })
+    fn faced(&self, step: &Step<'_, D, L>, phi: &[Vector<f64, D>]) -> Vec<Faced<D>> {
+        let Some(between) = &self.loads.contacts.between else { return Vec::new() };
+        let of = |(one, [_, relative]): (&Candidate<D>, [Vector<f64, D>; 2])| {
+            let [first, second] = between.pairs[one.pair].bodies.map(|body| step.supports.field_of(body));
+            let fields = if one.is_first { [first, second] } else { [second, first] };
+            Faced { fields, normal: one.normal, gap: one.normal.dot(&relative) }
         };
-        candidates.filter_map(of).collect()
+        between.candidates.iter().zip(self.relative_motions(step, phi)).map(of).collect()
     }
 
     /// The way along a unit vector that takes these bodies into another one; `None` if there is none on the way.

@@ -150,8 +150,8 @@ fn a_body_does_not_pass_a_thin_obstacle_silently() -> Result<(), Failure> {
     Ok(())
 }
 
-/// A block that a wall thinner than the depth of contact cannot hold turns back, or the run ends. In no step is it behind the wall. The steps are
-/// from 0.005 to 0.4 spacings long, in dynamics and in load steps.
+/// A block that flies against a wall thinner than the depth of contact turns back, or the run ends with the block before the wall. The block moves
+/// by 0.04 to 0.4 spacings in a step.
 #[test]
 fn a_body_does_not_come_out_behind_a_wall_that_is_thinner_than_a_step() -> Result<(), Failure> {
     let block =

@@ -192,7 +192,7 @@ fn narrow_obstacles_and_seams_are_named() -> Result<(), Failure> {
         assert_eq!(of(sound)?, Vec::<String>::new());
     }
     let pin = |width: f64| json!([{ "name": "pin", "shape": rect([4.0, 0.0], [4.0 + width, 3.0]) }]);
-    assert_one(&of(pin(0.4))?, &["obstacles[0] is 4.000e-1 wide", "5.000e-1 apart", "goes through"]);
+    assert_one(&of(pin(0.4))?, &["obstacles[0] is 4.000e-1 wide", "5.000e-1 apart", "the run ends"]);
     assert_eq!(of(pin(0.5))?, Vec::<String>::new());
     Ok(())
 }

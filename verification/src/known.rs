@@ -70,9 +70,9 @@ pub const KNOWN: &[Known] = &[
     Known {
         study: "contact",
         what: "undamped blocks that rest by friction: force above or below that at rest, 0.05 asked (5 of 50 blocks), and the way over the length, 1e-3 asked (one of them)",
-        why: "Part of the surface slips while gravity rises, and undamped vibrations that this leaves last. In block 22, which uses 0.84 of its friction, they grow \
-              until it hops: sliding with Coulomb's law is unstable in an undamped continuum, too. A stiffness damping of 0.002, or a contact a third as stiff, \
-              keeps its force within 0.04.",
+        why: "Part of the surface slips while gravity rises, and nothing damps the vibrations that this leaves. In block 22, which uses 0.84 of its friction, \
+              they grow until it hops: sliding with Coulomb's law is unstable in an undamped continuum, too. With a stiffness damping of 0.002, or a contact a \
+              third as stiff, the force on block 22 stays within 0.04.",
         since: "28 November 2026",
         factor: 3.0,
         cells: &[
@@ -92,7 +92,7 @@ pub const KNOWN: &[Known] = &[
     Known {
         study: "contact",
         what: "undamped blocks that slide: error of the acceleration over g sin θ, 0.02 asked (1 of 25 blocks)",
-        why: "Its vibrations grow as in the block above until it hops.",
+        why: "The vibrations of block 12 grow until it hops, as those of resting block 22 do.",
         since: "28 November 2026",
         factor: 3.0,
         cells: &[full_effort(&["12", "error of the acceleration"], 0.0446)],

@@ -100,7 +100,8 @@ pub(super) fn reports(effort: &Effort) -> Result<Vec<Report>, StudyError> {
         "random blocks below 0.99 of Coulomb's limit, one second after the load is on",
         &["seed", "quantity"],
     );
-    let mut slide = Report::new("random blocks above 1.01 of Coulomb's limit, over g sin θ", &["seed", "quantity"]);
+    let mut slide =
+        Report::new("random blocks above 1.01 of Coulomb's limit: errors over g sin θ", &["seed", "quantity"]);
     let resting = |seed: u64| {
         let mut random = Random::new(seed);
         let used = random.between(0.3, 0.99);

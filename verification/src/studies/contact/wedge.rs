@@ -11,8 +11,10 @@ const WEIGHT: f64 = 5.0;
 const HEIGHT: f64 = 0.5;
 const SPACING: f64 = 0.25;
 
-/// The way of the plate along the wedge.
+/// The way of the plate along the wedge, in the unit of time from 1 to 2.
 const WAY: f64 = 0.02;
+
+/// The length of a step.
 const STEP: f64 = 0.02;
 
 pub(super) fn report(effort: &Effort) -> Result<Report, StudyError> {
