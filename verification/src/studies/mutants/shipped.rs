@@ -9,10 +9,11 @@ use crate::studies::Outcome;
 use rayon::prelude::*;
 use serde_json::Value;
 use std::collections::{HashMap, HashSet};
-use std::io;
+use std::io::{self, BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus, Stdio};
-use std::thread::sleep;
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
+use std::thread::spawn;
 use std::time::{Duration, Instant};
 
 /// The feature of the library that builds the faults in.
@@ -23,6 +24,9 @@ const VARIABLE: &str = "BFREE_MUTANT";
 
 /// A check that takes longer hangs because of the fault.
 const PATIENCE: Duration = Duration::from_secs(300);
+
+/// The end of the line that a program prints when a test fails. Nobody needs the rest of its tests.
+const FAILED: &str = "... FAILED";
 
 /// The reasons why the faults could not be tried.
 #[derive(Debug, thiserror::Error)]
@@ -149,13 +153,13 @@ enum Verdict {
 fn attempt(programs: &Programs, check: Check, fault: Option<&str>) -> Result<Verdict, ShippedFaultError> {
     let (name, arguments): (&'static str, &[&str]) = match check {
         Check::Study(study) => (STUDIES, &[study, "--first"]),
-        Check::Test(tests) => (SUITE, &[tests, "--quiet"]),
-        Check::Unit(tests) => (UNITS, &[tests, "--quiet"]),
+        Check::Test(tests) => (SUITE, &[tests]),
+        Check::Unit(tests) => (UNITS, &[tests]),
     };
     let program = programs.get(name).ok_or(ShippedFaultError::NotBuilt { name })?;
     let mut command = Command::new(program);
     command.args(arguments).current_dir(root());
-    command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::null());
     command.env_remove(VARIABLE).envs(fault.map(|fault| (VARIABLE, fault)));
     // Checks run side by side; the results do not depend on the number of threads, and tests of threads start their own.
     command.env("RAYON_NUM_THREADS", "1");
@@ -163,15 +167,25 @@ fn attempt(programs: &Programs, check: Check, fault: Option<&str>) -> Result<Ver
     command.env("PROPTEST_DISABLE_FAILURE_PERSISTENCE", "true");
     let failed = |source| ShippedFaultError::Start { command: format!("{}", program.display()), source };
     let mut child = command.spawn().map_err(failed)?;
-    let start = Instant::now();
-    loop {
-        if let Some(status) = child.try_wait().map_err(failed)? {
-            return Ok(if status.success() { Verdict::Passes } else { Verdict::Fails });
-        }
-        if start.elapsed() > PATIENCE {
-            child.kill().and_then(|()| child.wait()).map_err(failed)?;
-            return Ok(Verdict::Hangs);
-        }
-        sleep(Duration::from_millis(10));
+    let lines = child.stdout.take().map(|out| lines(BufReader::new(out)));
+    let end = Instant::now() + PATIENCE;
+    // Without a pipe there are no lines, and only the end of the program counts.
+    while let Some(line) = lines.as_ref().map(|lines| lines.recv_timeout(end.saturating_duration_since(Instant::now())))
+    {
+        let verdict = match line {
+            Err(RecvTimeoutError::Disconnected) => break,
+            Err(RecvTimeoutError::Timeout) => Verdict::Hangs,
+            Ok(line) if line.ends_with(FAILED) => Verdict::Fails,
+            Ok(_) => continue,
+        };
+        return child.kill().and_then(|()| child.wait()).map(|_| verdict).map_err(failed);
     }
+    child.wait().map(|status| if status.success() { Verdict::Passes } else { Verdict::Fails }).map_err(failed)
+}
+
+/// The lines of a program, as it prints them.
+fn lines(out: impl BufRead + Send + 'static) -> Receiver<String> {
+    let (sender, lines) = mpsc::channel();
+    spawn(move || out.lines().map_while(Result::ok).try_for_each(|line| sender.send(line)));
+    lines
 }
