@@ -118,12 +118,14 @@ impl Scene {
     /// ```
     /// use bfree::field::Field;
     ///
-    /// // Without inertia there are no velocities to show; where a metal flows, its plastic strain is what pictures show.
+    /// // Without inertia there are no velocities to show; where a metal flows, its plastic strain is what pictures show. The numbers of
+    /// // several bodies tell the bodies apart.
     /// let of = |name: &str| {
     ///     let asked = ["output.fields=null".parse()?];
     ///     Ok::<_, Box<dyn std::error::Error>>(bfree::scene::read_file(format!("scenes/{name}.json").as_ref(), &asked)?.fields())
     /// };
     /// assert_eq!(of("cook")?, [Field::Displacement, Field::Stress, Field::Jacobian]);
+    /// assert_eq!(of("rings")?, [Field::Displacement, Field::Velocity, Field::Stress, Field::Jacobian, Field::Body]);
     /// assert_eq!(of("tube")?, [Field::PlasticStrain, Field::Displacement, Field::Stress, Field::Jacobian]);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
@@ -134,6 +136,7 @@ impl Scene {
             let mut fields = vec![Field::Displacement, Field::Velocity, Field::Stress, Field::Jacobian];
             fields.retain(|field| has_inertia || !field.needs_inertia());
             fields.splice(..0, self.laws().any(flows).then_some(Field::PlasticStrain));
+            fields.extend((self.bodies.len() > 1).then_some(Field::Body));
             fields
         })
     }

@@ -22,7 +22,7 @@ pub struct Output {
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub checkpoint: Option<f64>,
     /// The fields of a snapshot, each at most once; pictures show the first. Default: displacement, velocity (with inertia only), stress,
-    /// jacobian. If a body may flow plastically, plastic_strain comes first.
+    /// jacobian. If a body may flow plastically, plastic_strain comes first. If there are several bodies, body comes last.
     pub fields: Option<Vec<Field>>,
     /// Histories of one field at one point, written in every step.
     #[serde(default)]
