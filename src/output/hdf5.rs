@@ -51,7 +51,7 @@ impl Type {
 
 /// Whether an object can have this name.
 pub(super) fn is_link(name: &str) -> bool {
-    !name.is_empty() && name != "." && !name.contains('/')
+    !name.is_empty() && name != "." && !name.contains(['/', '\0'])
 }
 
 /// The bytes of signed whole numbers.
@@ -203,14 +203,32 @@ impl<W: Write + Seek> Writer<W> {
     }
 
     /// Writes a group of objects, given by names and addresses; see [`is_link`].
-    pub(super) fn group(&mut self, links: &[(&str, u64)], attributes: &[Attribute]) -> Result<u64> {
-        let mut messages = vec![(0x02, [&[0, 0], &[0xff; 16][..]].concat())];
-        for (name, address) in links {
-            // The link has version 1, the character set UTF-8, and two bytes for the length of the name.
-            let head = [&[1, 0x11, 1], &small::<u16>(name.len())?.to_le_bytes()[..]].concat();
-            messages.push((0x06, [&head, name.as_bytes(), &address.to_le_bytes()].concat()));
+    pub(super) fn group(&mut self, links: &[(impl AsRef<str>, u64)], attributes: &[Attribute]) -> Result<u64> {
+        self.links(links.iter().map(|(name, address)| (name.as_ref(), 0, address.to_le_bytes().to_vec())), attributes)
+    }
+
+    /// Writes a group of soft links, given by names and paths. Paths here are short.
+    pub(super) fn soft_links(&mut self, links: &[(String, String)]) -> Result<u64> {
+        let target = |path: &str| [&(path.len() as u16).to_le_bytes(), path.as_bytes()].concat();
+        self.links(links.iter().map(|(name, path)| (name.as_str(), 1, target(path))), &[])
+    }
+
+    /// Writes a group of links: names, types and targets. Readers of blocks need the order of the links.
+    fn links<'a>(
+        &mut self,
+        links: impl Iterator<Item = (&'a str, u8, Vec<u8>)>,
+        attributes: &[Attribute],
+    ) -> Result<u64> {
+        let mut messages = Vec::new();
+        for (name, kind, target) in links {
+            // The link has version 1, a type, its place in the order, the character set UTF-8, and two bytes for the length of the name.
+            let place = (messages.len() as u64).to_le_bytes();
+            let head = [&[1, 0x1d, kind], &place[..], &[1], &small::<u16>(name.len())?.to_le_bytes()].concat();
+            messages.push((0x06, [&head, name.as_bytes(), &target].concat()));
         }
-        self.object(messages, attributes)
+        // The order is tracked: the message has the number of links, and no addresses of an index.
+        let about = [&[0, 1], &(messages.len() as u64).to_le_bytes()[..], &[0xff; 16]].concat();
+        self.object([(0x02, about)].into_iter().chain(messages), attributes)
     }
 
     /// Writes the header of an object, and returns its address.

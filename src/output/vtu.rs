@@ -36,6 +36,13 @@ impl Array {
         Self { name: name.to_owned(), components: vec![String::new()], values, is_index }
     }
 
+    /// The array at some of the points.
+    pub(super) fn select(&self, points: &[usize]) -> Self {
+        let width = self.components.len();
+        let values = points.iter().flat_map(|point| &self.values[point * width..][..width]).copied().collect();
+        Self { name: self.name.clone(), components: self.components.clone(), values, is_index: self.is_index }
+    }
+
     /// The values as a file holds them.
     pub(super) fn bytes(&self) -> Vec<u8> {
         if self.is_index {

@@ -147,3 +147,19 @@ fn snapshots_are_packed_into_one_file_with_the_same_bytes_each_time() -> Result<
     assert!(!first.join("particles.vtkhdf").exists());
     Ok(())
 }
+
+#[test]
+fn several_bodies_are_packed_as_blocks_with_their_names() -> Result<(), Failure> {
+    let folder = tempfile::tempdir()?;
+    let (scene, out) = (Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/collision.json"), folder.path().join("out"));
+    // The default fields tell the bodies apart.
+    let flags = ["run", "--quiet", "--set", "output.fields=null", "--steps", "1"];
+    let (code, _, text) = program(&flags, &[&scene, "--out".as_ref(), &out])?;
+    assert_eq!(code, Some(0), "{text}");
+    let (code, told, text) = program(&["pack"], &[&out])?;
+    assert!(code == Some(0) && told.contains("particles.vtkhdf"), "{told}{text}");
+    let file = fs::read(out.join("particles.vtkhdf"))?;
+    let holds = |text: &str| file.windows(text.len()).any(|window| window == text.as_bytes());
+    assert!(["MultiBlockDataSet", "soft", "stiff"].into_iter().all(holds));
+    Ok(())
+}
