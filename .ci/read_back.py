@@ -1,9 +1,10 @@
 """Reads the snapshots of a run with meshio and compares every field with what it must be. Reads the packed snapshots with h5py, and with vtk
-where it is installed, and compares every array and time with those of the snapshots: they must have the same bits.
+where it is installed, and compares every array and time with those of the snapshots: they must have the same bits, body by body.
 
 usage: read_back.py DIRECTORY — of a packed run in 2D with all fields in `output.fields`, one body, and no loads.
        read_back.py --packed DIRECTORY — of any packed run; compares only the packed snapshots."""
 import csv
+import json
 import re
 import sys
 from pathlib import Path
@@ -14,6 +15,7 @@ import numpy as np
 
 try:
     from vtkmodules.util.numpy_support import vtk_to_numpy
+    from vtkmodules.vtkCommonDataModel import vtkCompositeDataSet
     from vtkmodules.vtkIOHDF import vtkHDFReader
 except ImportError:
     vtkHDFReader = None
@@ -49,20 +51,34 @@ def bits(reader, name, found, expected):
 
 
 def by_h5py(path, step):
-    """Time, points, arrays and cells of a step, by the offsets of the format."""
+    """Number of steps, time, and the grids at a step by their names, by the offsets of the format."""
     with h5py.File(path) as file:
-        root, steps = file["VTKHDF"], file["VTKHDF/Steps"]
-        assert root.attrs["Type"] == b"UnstructuredGrid" and list(root.attrs["Version"]) == [2, 2], dict(root.attrs)
-        part = steps["PartOffsets"][step]
-        count, cells = root["NumberOfPoints"][part], root["NumberOfCells"][part]
-        rows = lambda array, offset: array[offset:offset + count]
-        # Every part before has one offset more than cells.
-        first = steps["CellOffsets"][step, 0] + part
-        ends = root["Offsets"][first:first + cells + 1]
-        connectivity = rows(root["Connectivity"], steps["ConnectivityIdOffsets"][step, 0])
-        data = {name: rows(root["PointData"][name], steps["PointDataOffsets"][name][step]) for name in root["PointData"]}
-        points = rows(root["Points"], steps["PointOffsets"][step])
-        return steps["Values"][step], points, data, connectivity, ends, steps.attrs["NSteps"]
+        root = file["VTKHDF"]
+        assert list(root.attrs["Version"]) == [2, 2], dict(root.attrs)
+        if root.attrs["Type"] == b"UnstructuredGrid":
+            blocks = {None: root}
+        else:
+            assert root.attrs["Type"] == b"MultiBlockDataSet", dict(root.attrs)
+            blocks = dict(root["Assembly"])
+            order = h5py.h5p.CRT_ORDER_TRACKED
+            assert all(group.id.get_create_plist().get_link_creation_order() & order for group in (root, root["Assembly"]))
+        steps = next(iter(blocks.values()))["Steps"]
+        return steps.attrs["NSteps"], steps["Values"][step], {name: h5py_grid(grid, step) for name, grid in blocks.items()}
+
+
+def h5py_grid(root, step):
+    """Points, arrays, connectivity and offsets of a grid."""
+    assert root.attrs["Type"] == b"UnstructuredGrid", dict(root.attrs)
+    steps = root["Steps"]
+    part = steps["PartOffsets"][step]
+    count, cells = root["NumberOfPoints"][part], root["NumberOfCells"][part]
+    rows = lambda array, offset: array[offset:offset + count]
+    # Every part before has one offset more than cells.
+    first = steps["CellOffsets"][step, 0] + part
+    ends = root["Offsets"][first:first + cells + 1]
+    connectivity = rows(root["Connectivity"], steps["ConnectivityIdOffsets"][step, 0])
+    data = {name: rows(root["PointData"][name], steps["PointDataOffsets"][name][step]) for name in root["PointData"]}
+    return rows(root["Points"], steps["PointOffsets"][step]), data, connectivity, ends
 
 
 def by_vtk(path, step):
@@ -73,37 +89,59 @@ def by_vtk(path, step):
     count = reader.GetNumberOfSteps()
     reader.SetStep(step)
     reader.Update()
-    grid = reader.GetOutput()
+    data = reader.GetOutputDataObject(0)
+    if data.IsA("vtkUnstructuredGrid"):
+        blocks = {None: data}
+    else:
+        name = lambda k: data.GetMetaData(k).Get(vtkCompositeDataSet.NAME())
+        blocks = {name(k): data.GetBlock(k) for k in range(data.GetNumberOfBlocks())}
+    return count, reader.GetTimeValue(), {name: vtk_grid(grid) for name, grid in blocks.items()}
+
+
+def vtk_grid(grid):
+    """Points, arrays, connectivity and offsets of a grid."""
     arrays = [grid.GetPointData().GetArray(k) for k in range(grid.GetPointData().GetNumberOfArrays())]
     data = {array.GetName(): vtk_to_numpy(array) for array in arrays}
     cells = grid.GetCells()
-    ends = vtk_to_numpy(cells.GetOffsetsArray())
-    return reader.GetTimeValue(), vtk_to_numpy(grid.GetPoints().GetData()), data, vtk_to_numpy(cells.GetConnectivityArray()), ends, count
+    connectivity, ends = vtk_to_numpy(cells.GetConnectivityArray()), vtk_to_numpy(cells.GetOffsetsArray())
+    return vtk_to_numpy(grid.GetPoints().GetData()), data, connectivity, ends
 
 
 def packed(name):
     """Compares a packed series with its snapshots."""
     path, series = directory / f"{name}.vtkhdf", entries(name)
+    meshes = [meshio.read(directory / file) for _, file in series]
+    number = lambda mesh: mesh.point_data.get("body", np.zeros(len(mesh.points), int)).astype(int)
+    bodies = np.unique(np.concatenate([number(mesh) for mesh in meshes]))
+    names = {body: body_names[body] for body in bodies} if len(bodies) > 1 else {bodies[0]: None}
     for reader, read in [("h5py", by_h5py), ("vtk", by_vtk if vtkHDFReader else None)]:
         if read is None:
             print(f"skipped: {path.name} read by vtk, which is not installed")
             continue
-        for step, (time, file) in enumerate(series):
-            mesh = meshio.read(directory / file)
-            found, points, data, connectivity, ends, count = read(path, step)
+        for step, ((time, _), mesh) in enumerate(zip(series, meshes)):
+            count, found, grids = read(path, step)
             assert (count, found) == (len(series), float(time)), f"{reader}: {count} steps, time {found} of step {step}, {time}"
-            bits(reader, "Points", points, mesh.points)
-            assert set(data) == set(mesh.point_data), f"{reader}: {set(data)}"
-            for array, values in mesh.point_data.items():
-                bits(reader, array, data[array], values)
-            cells = mesh.cells[0].data
-            bits(reader, "connectivity", connectivity, cells.ravel().astype(np.int64))
-            bits(reader, "offsets", ends, np.arange(len(cells) + 1, dtype=np.int64) * cells.shape[1])
+            assert list(grids) == list(names.values()), f"{reader}: {list(grids)}, {names}"
+            for body, block in names.items():
+                compare(f"{reader}: {block}", grids[block], mesh, number(mesh) == body)
     whole, parts = path.stat().st_size, sum((directory / file).stat().st_size for _, file in series)
-    print(f"{path.name}: {len(series)} snapshots, {whole} bytes, {whole / parts:.3f} of the .vtu files")
+    print(f"{path.name}: {len(names)} grids, {len(series)} snapshots, {whole} bytes, {whole / parts:.3f} of the .vtu files")
+
+
+def compare(reader, grid, mesh, rows):
+    """Compares a grid with some points of a snapshot."""
+    points, data, connectivity, ends = grid
+    bits(reader, "Points", points, mesh.points[rows])
+    assert set(data) == set(mesh.point_data), f"{reader}: {set(data)}"
+    for array, values in mesh.point_data.items():
+        bits(reader, array, data[array], values[rows])
+    corners = mesh.cells[0].data.shape[1]
+    bits(reader, "connectivity", connectivity, np.arange(rows.sum(), dtype=np.int64))
+    bits(reader, "offsets", ends, np.arange(rows.sum() // corners + 1, dtype=np.int64) * corners)
 
 
 assert (directory / "particles.vtkhdf").is_file(), "pack the run first: bfree pack DIRECTORY"
+body_names = json.loads((directory / "provenance.json").read_text())["bodies"]
 for path in sorted(directory.glob("*.vtkhdf")):
     packed(path.stem)
 if "--packed" in sys.argv:
