@@ -32,6 +32,20 @@ const LEAST_DRIVER: i32 = 12_000;
 /// The least compute capability, major version.
 const LEAST_CAPABILITY: i32 = 8;
 
+/// The argument of a kernel: a struct with the layout and the names of that in the kernel's source.
+macro_rules! arguments {
+    ($($field:ident $(: $value:expr)?),+ $(,)?) => {{
+        #[derive(Clone, Copy)]
+        #[repr(C)]
+        #[allow(non_camel_case_types)]
+        struct Arguments<$($field),+> {
+            $($field: $field),+
+        }
+        Arguments { $($field $(: $value)?),+ }
+    }};
+}
+pub(super) use arguments;
+
 /// A failure of the device or its driver.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum GpuError {

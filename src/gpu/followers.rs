@@ -1,6 +1,6 @@
 //! Nodes that follow others, and values that are fixed, on a device (`kernels/data.h`).
 
-use super::device::{Buffer, Gpu};
+use super::device::{Buffer, Gpu, arguments};
 use super::vectors::GpuVector;
 
 /// E, by which outer nodes follow inner ones, on a device.
@@ -13,26 +13,6 @@ pub(crate) struct Followers {
     follower_weights: Buffer<f64>,
     moved: Buffer<f64>,
     dimension: usize,
-}
-
-/// `Followers` of `kernels/data.h`.
-#[derive(Clone, Copy)]
-#[repr(C)]
-struct FollowersArguments {
-    outer: u64,
-    follows: u64,
-    leader_first: u64,
-    leaders: u64,
-    leader_weights: u64,
-    outer_count: i64,
-    inner: u64,
-    follower_first: u64,
-    followers: u64,
-    follower_weights: u64,
-    inner_count: i64,
-    field: u64,
-    moved: u64,
-    dimension: i32,
 }
 
 /// Sparse rows: the number of each row, and its entries with weights.
@@ -70,7 +50,8 @@ impl Followers {
     fn launch(&self, gpu: &Gpu, kernel: &'static str, count: usize, field: &GpuVector) {
         let ([outer, leader_first, leaders], [inner, follower_first, followers]) =
             (self.outer.each_ref().map(Buffer::address), self.inner.each_ref().map(Buffer::address));
-        let arguments = FollowersArguments {
+        // `Followers` of `kernels/data.h`.
+        let arguments = arguments! {
             outer,
             follows: self.follows.address(),
             leader_first,
@@ -101,17 +82,9 @@ impl Followers {
     }
 }
 
-/// `Fixed` of `kernels/data.h`.
-#[derive(Clone, Copy)]
-#[repr(C)]
-struct FixedArguments {
-    fixed: u64,
-    field: u64,
-    n: i64,
-}
-
 /// Sets the fixed values of a field to zero.
 pub(crate) fn clear_fixed(gpu: &Gpu, fixed: &Buffer<u8>, field: &mut GpuVector) {
     let n = fixed.len();
-    gpu.launch_for("clear_fixed", n, &FixedArguments { fixed: fixed.address(), field: field.address(), n: n as i64 });
+    // `Fixed` of `kernels/data.h`.
+    gpu.launch_for("clear_fixed", n, &arguments! { fixed: fixed.address(), field: field.address(), n: n as i64 });
 }

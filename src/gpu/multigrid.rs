@@ -1,6 +1,6 @@
 //! The levels and the filter of multigrid on a device (`kernels/multigrid.h`).
 
-use super::device::{Buffer, Gpu};
+use super::device::{Buffer, Gpu, arguments};
 use super::followers::{Followers, clear_fixed};
 use super::vectors::GpuVector;
 use crate::space::vector::Vectors;
@@ -39,32 +39,6 @@ pub(crate) struct Level {
     fixed_finer: Buffer<u8>,
     lists: [Buffer<u32>; 4],
     followers: Option<Followers>,
-}
-
-/// `Stencil` of `kernels/multigrid.h`.
-#[derive(Clone, Copy)]
-#[repr(C)]
-struct StencilArguments {
-    neighbours: u64,
-    entries: u64,
-    held: u64,
-    x: u64,
-    y: u64,
-    nodes: i64,
-    dimension: i32,
-}
-
-/// `Interpolation` of `kernels/multigrid.h`.
-#[derive(Clone, Copy)]
-#[repr(C)]
-struct InterpolationArguments {
-    lists: [u64; 4],
-    fixed: u64,
-    held: u64,
-    x: u64,
-    y: u64,
-    n: i64,
-    dimension: i32,
 }
 
 /// `[node][number]` as `[number][node]`, so that neighbouring threads read neighbouring numbers.
@@ -120,7 +94,8 @@ impl Level {
         }
         let x = extended.as_deref().unwrap_or(x);
         let nodes = self.held.len() / self.dimension;
-        let arguments = StencilArguments {
+        // `Stencil` of `kernels/multigrid.h`.
+        let arguments = arguments! {
             neighbours: self.neighbours.address(),
             entries: self.entries.address(),
             held: self.held_at_once(),
@@ -140,7 +115,8 @@ impl Level {
 
     fn interpolate(&self, gpu: &Gpu, kernel: &'static str, held: u64, x: &GpuVector, y: &mut GpuVector) {
         let n = y.0.len();
-        let arguments = InterpolationArguments {
+        // `Interpolation` of `kernels/multigrid.h`.
+        let arguments = arguments! {
             lists: self.lists.each_ref().map(Buffer::address),
             fixed: self.fixed_finer.address(),
             held,

@@ -1,6 +1,6 @@
 //! The linearised forces of surface points on a device (`kernels/points.h`).
 
-use super::device::{Buffer, Gpu};
+use super::device::{Buffer, Gpu, arguments};
 use super::transfer::by_node;
 use super::vectors::GpuVector;
 
@@ -45,26 +45,6 @@ pub(crate) struct Points {
     /// For each node, the first of its points, and the points with weights.
     by_node: [Buffer<u32>; 2],
     weights_by_node: Buffer<f64>,
-}
-
-/// `Points` of `kernels/points.h`.
-#[derive(Clone, Copy)]
-#[repr(C)]
-struct PointsArguments {
-    first: u64,
-    nodes: u64,
-    weights: u64,
-    blocks: u64,
-    tangents: u64,
-    on_free: u64,
-    of_motion: u64,
-    motion: u64,
-    motions: u64,
-    obstacles: i64,
-    u: u64,
-    forces: u64,
-    n: i64,
-    dimension: i32,
 }
 
 /// `PointSums` of `kernels/data.h`.
@@ -118,7 +98,8 @@ impl Points {
         let n = self.first.len() - 1;
         let address = |of: &Buffer<f64>| if of.len() == 0 { 0 } else { of.address() };
         let [weights, blocks, tangents, of_motion, motion] = self.numbers.each_ref().map(address);
-        let arguments = PointsArguments {
+        // `Points` of `kernels/points.h`.
+        let arguments = arguments! {
             first: self.first.address(),
             nodes: self.nodes.address(),
             weights,
