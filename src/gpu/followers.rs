@@ -2,10 +2,12 @@
 
 use super::device::{Buffer, Gpu, arguments};
 use super::vectors::GpuVector;
+use crate::aggregation::Rows;
 
 /// E, by which outer nodes follow inner ones, on a device.
 #[derive(Debug)]
 pub(crate) struct Followers {
+    /// The nodes of the rows, the starts of the rows, and their entries.
     outer: [Buffer<u32>; 3],
     follows: Buffer<u8>,
     leader_weights: Buffer<f64>,
@@ -15,33 +17,21 @@ pub(crate) struct Followers {
     dimension: usize,
 }
 
-/// Sparse rows: the number of each row, and its entries with weights.
-pub(crate) type SparseRows<'a> = &'a mut dyn Iterator<Item = (u32, Vec<(u32, f64)>)>;
-
-/// Numbers of rows, starts of rows, entries, weights.
-fn flat(rows: SparseRows<'_>) -> ([Vec<u32>; 3], Vec<f64>) {
-    let (mut numbers, mut starts, mut entries, mut weights) = (Vec::new(), vec![0], Vec::new(), Vec::new());
-    for (number, row) in rows {
-        numbers.push(number);
-        entries.extend(row.iter().map(|&(entry, _)| entry));
-        weights.extend(row.iter().map(|&(_, weight)| weight));
-        starts.push(entries.len() as u32);
-    }
-    ([numbers, starts, entries], weights)
-}
-
 impl Followers {
     /// The outer nodes with their inner ones, the inner nodes with the places of their outer ones, and whether each component of an outer node
     /// follows.
-    pub(crate) fn new(gpu: &Gpu, outer: SparseRows<'_>, inner: SparseRows<'_>, follows: &[bool]) -> Self {
-        let ((outer, leader_weights), (inner, follower_weights)) = (flat(outer), flat(inner));
+    pub(crate) fn new(gpu: &Gpu, [outer, inner]: [&Rows; 2], follows: &[bool]) -> Self {
+        let numbers = |of: &Rows| {
+            let [starts, entries] = of.entries.arrays();
+            [&of.nodes, starts, entries].map(|list| gpu.copy_of(list))
+        };
         let follows: Vec<u8> = follows.iter().map(|&one| u8::from(one)).collect();
         Self {
-            dimension: follows.len() / outer[0].len().max(1),
-            outer: outer.map(|list| gpu.copy_of(&list)),
-            leader_weights: gpu.copy_of(&leader_weights),
-            inner: inner.map(|list| gpu.copy_of(&list)),
-            follower_weights: gpu.copy_of(&follower_weights),
+            dimension: follows.len() / outer.nodes.len().max(1),
+            outer: numbers(outer),
+            leader_weights: gpu.copy_of(&outer.weights),
+            inner: numbers(inner),
+            follower_weights: gpu.copy_of(&inner.weights),
             moved: gpu.memory_for(follows.len()),
             follows: gpu.copy_of(&follows),
         }

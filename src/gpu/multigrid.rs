@@ -3,6 +3,7 @@
 use super::device::{Buffer, Gpu, arguments};
 use super::followers::{Followers, clear_fixed};
 use super::vectors::GpuVector;
+use crate::lists::Lists;
 use crate::space::vector::Vectors;
 
 /// Places of a stencil.
@@ -21,9 +22,8 @@ pub(crate) struct LevelArrays<'a> {
     pub held: &'a [bool],
     /// Whether a value of the finer level is no unknown.
     pub fixed_finer: &'a [bool],
-    /// The coarse nodes around each finer node: starts and entries; and the finer nodes that are interpolated from each coarse node.
-    pub around: [&'a [u32]; 2],
-    pub within: [&'a [u32]; 2],
+    /// The coarse nodes around each finer node, and the finer nodes that are interpolated from each coarse node.
+    pub interpolation: [&'a Lists<u32>; 2],
     /// E, by which outer nodes follow others.
     pub followers: Option<Followers>,
 }
@@ -37,7 +37,7 @@ pub(crate) struct Level {
     inverse: Buffer<f64>,
     held: Buffer<u8>,
     fixed_finer: Buffer<u8>,
-    lists: [Buffer<u32>; 4],
+    lists: [[Buffer<u32>; 2]; 2],
     followers: Option<Followers>,
 }
 
@@ -57,7 +57,7 @@ fn bytes(of: &[bool]) -> Vec<u8> {
 
 impl Level {
     pub(crate) fn new(gpu: &Gpu, arrays: LevelArrays<'_>) -> Self {
-        let LevelArrays { dimension, neighbours, entries, inverse, held, fixed_finer, around, within, followers } =
+        let LevelArrays { dimension, neighbours, entries, inverse, held, fixed_finer, interpolation, followers } =
             arrays;
         Self {
             dimension,
@@ -66,7 +66,7 @@ impl Level {
             inverse: gpu.copy_of(inverse),
             held: gpu.copy_of(&bytes(held)),
             fixed_finer: gpu.copy_of(&bytes(fixed_finer)),
-            lists: [around[0], around[1], within[0], within[1]].map(|list| gpu.copy_of(list)),
+            lists: interpolation.map(|lists| lists.arrays().map(|list| gpu.copy_of(list))),
             followers,
         }
     }
@@ -117,7 +117,7 @@ impl Level {
         let n = y.0.len();
         // `Interpolation` of `kernels/multigrid.h`.
         let arguments = arguments! {
-            lists: self.lists.each_ref().map(Buffer::address),
+            lists: self.lists.each_ref().map(|lists| lists.each_ref().map(Buffer::address)),
             fixed: self.fixed_finer.address(),
             held,
             x: x.address(),
