@@ -179,7 +179,7 @@ fn in_profile<T: Real, const D: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shape::{Ball, Block, Cone, Difference, HalfSpace, Polygon, Shape, Similar, Surface, Union, rotation};
+    use crate::shape::{Ball, Block, Cone, Difference, HalfSpace, Polygon, Shape, Similar, Surface, rotation};
     use num_dual::Dual64;
 
     /// The distance and the normal of the feature are those of the shape, and the curvature is the derivative of the normal.
@@ -216,7 +216,7 @@ mod tests {
         check(&ball.clone().into(), &points);
         check(&Difference { of: Box::new(block.clone().into()), minus: Box::new(ball.clone().into()) }.into(), &points);
         check(
-            &Union(vec![block.into(), Ball { center: Vector::from([2.5, 1.5]), radius: 0.3 }.into()]).into(),
+            &Shape::union(vec![block.into(), Ball { center: Vector::from([2.5, 1.5]), radius: 0.3 }.into()]),
             &points,
         );
         check(&Polygon::new(corners.to_vec())?.into(), &points);

@@ -27,7 +27,7 @@ mod tests;
 pub use ball::Ball;
 pub use block::Block;
 pub(crate) use cloud::{Cloud, CloudPoint, NoSurface, cloud_surface};
-pub use combined::{Difference, Intersection, Union};
+pub use combined::{Combination, Difference};
 pub use cone::Cone;
 pub use cut::Facet;
 pub use feature::{Distance, Feature};
@@ -128,12 +128,10 @@ shapes! {
     Polygon;
     /// A cylinder or a cone.
     Cone;
-    /// The union of the parts.
-    Union;
+    /// The union of the parts, or their intersection.
+    Combination;
     /// The points that lie in one solid and not in another.
     Difference;
-    /// The intersection of the parts.
-    Intersection;
     /// A solid turned and scaled.
     Similar;
     /// The inside of a closed surface of triangles.
@@ -250,13 +248,13 @@ impl<const D: usize> Shape<D> {
     /// bound.
     ///
     /// ```
-    /// use bfree::shape::{Ball, HalfSpace, Intersection, Shape};
+    /// use bfree::shape::{Ball, HalfSpace, Shape};
     /// use bfree::tensor::Vector;
     ///
     /// // The lower half of a disc; for an intersection the bound is that of the planes and balls in it.
     /// let disc = Ball { center: Vector::from([0.0, 0.0]), radius: 1.0 };
     /// let below = HalfSpace { point: Vector::from([0.0, 0.0]), normal: Vector::from([0.0, 3.0]) };
-    /// let half = Shape::from(Intersection(vec![disc.into(), below.into()]));
+    /// let half = Shape::intersection(vec![disc.into(), below.into()]);
     /// assert_eq!(half.bounding_box(), (Vector::from([-1.0, -1.0]), Vector::from([1.0, 0.0])));
     /// ```
     pub fn bounding_box(&self) -> (Vector<f64, D>, Vector<f64, D>) {
