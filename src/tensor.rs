@@ -13,6 +13,9 @@ pub type Vector<T, const D: usize> = SVector<T, D>;
 /// A second-order tensor of `D`×`D` components.
 pub type Tensor<T, const D: usize> = SMatrix<T, D, D>;
 
+/// Rows and columns of the six numbers of a symmetric tensor in three dimensions.
+pub(crate) const SYMMETRIC: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)];
+
 /// The identity tensor.
 ///
 /// ```

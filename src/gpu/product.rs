@@ -6,7 +6,8 @@ use super::points::{PointSums, Points};
 use super::rows::{Rows, RowsArguments};
 use super::transfer::Transfer;
 use super::vectors::GpuVector;
-use std::sync::{Arc, Mutex, PoisonError};
+use crate::parallel::held;
+use std::sync::{Arc, Mutex};
 
 /// Most sets of rows of a product.
 pub(crate) const SETS: usize = 4;
@@ -55,7 +56,7 @@ impl Product {
             }));
         }
         let Some(followers) = &self.followers else { return self.apply_to_all(x, self.prescribed.address(), y) };
-        let mut extended = self.extended.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut extended = held(&self.extended);
         gpu.copy(&x.0, &mut extended.0);
         followers.extend(gpu, &mut extended);
         self.apply_to_all(&extended, 0, y);
