@@ -47,7 +47,7 @@ pub use law::{
 pub(crate) use list::LawVisitor;
 pub use list::{Material, Parameters};
 pub use listed::Listed;
-pub use moduli::{out_of_plane_stress, p_wave_modulus, poissons_ratio, stiffness_at_rest};
+pub use moduli::{out_of_plane_stress, p_wave_modulus, poissons_ratio};
 pub use mooney_rivlin::MooneyRivlin;
 pub use neo_hookean::NeoHookean;
 pub use ogden::{Ogden, OgdenTerm};

@@ -2,7 +2,6 @@
 
 use super::{Law, MaterialState};
 use crate::tensor::{Tensor, embed};
-use nalgebra::SMatrix;
 
 /// The largest Poisson's ratio of the body at rest, ℂ₁₁₂₂/(ℂ₁₁₁₁ + ℂ₁₁₂₂) over the axes. For isotropic laws it is ν.
 ///
@@ -20,47 +19,6 @@ pub fn poissons_ratio<L: Law>(law: &L) -> f64 {
         across / (across + stress[(k, k)])
     };
     of(0).max(of(1)).max(of(2))
-}
-
-/// The least and the largest eigenvalue of ℂ of the body at rest, for strains of size 1. If the least one is negative, the body is
-/// unstable.
-///
-/// ```
-/// use bfree::material::{Energy, FromEnergy, Lame, NeoHookean, stiffness_at_rest};
-/// use bfree::scalar::Real;
-/// use bfree::tensor::{Tensor, contract};
-///
-/// // 2G in shear, 3Λ + 2G under pressure.
-/// let [least, largest] = stiffness_at_rest(&NeoHookean::logarithmic(Lame::new(1.0, 2.0)?));
-/// assert!((least - 4.0).abs() < 1e-12 && (largest - 7.0).abs() < 1e-12);
-///
-/// /// W = −E:E
-/// struct Wrong;
-///
-/// impl Energy for Wrong {
-///     fn energy<T: Real>(&self, e: &Tensor<T, 3>) -> T {
-///         -contract(e, e)
-///     }
-/// }
-///
-/// assert!(stiffness_at_rest(&FromEnergy(Wrong)).iter().all(|stiffness| (stiffness + 2.0).abs() < 1e-12));
-/// # Ok::<(), bfree::material::LameError>(())
-/// ```
-pub fn stiffness_at_rest<L: Law>(law: &L) -> [f64; 2] {
-    // An orthonormal basis of the symmetric strains.
-    let basis = |k: usize| {
-        let (i, j) = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)][k];
-        let mut strain = Tensor::<f64, 3>::zeros();
-        (strain[(i, j)], strain[(j, i)]) = if i == j { (1.0, 1.0) } else { (0.5_f64.sqrt(), 0.5_f64.sqrt()) };
-        strain
-    };
-    let mut stiffness = SMatrix::<f64, 6, 6>::zeros();
-    for column in 0..6 {
-        let stress = stress_of(law, &basis(column));
-        (0..6).for_each(|row| stiffness[(row, column)] = stress.dot(&basis(row)));
-    }
-    let values = ((stiffness + stiffness.transpose()) * 0.5).symmetric_eigenvalues();
-    [values.min(), values.max()]
 }
 
 /// ℂ : X of the body at rest.
