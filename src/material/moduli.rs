@@ -4,15 +4,7 @@ use super::{Law, MaterialState};
 use crate::tensor::{Tensor, embed};
 
 /// The largest Poisson's ratio of the body at rest, ℂ₁₁₂₂/(ℂ₁₁₁₁ + ℂ₁₁₂₂) over the axes. For isotropic laws it is ν.
-///
-/// ```
-/// use bfree::material::{Lame, NeoHookean, poissons_ratio};
-///
-/// let law = NeoHookean::logarithmic(Lame::from_young_poisson(100.0, 0.45)?);
-/// assert!((poissons_ratio(&law) - 0.45).abs() < 1e-12);
-/// # Ok::<(), bfree::material::LameError>(())
-/// ```
-pub fn poissons_ratio<L: Law>(law: &L) -> f64 {
+pub(crate) fn poissons_ratio<L: Law>(law: &L) -> f64 {
     let of = |k: usize| {
         let stress = stress_along(law, k);
         let across = (0..3).filter(|&i| i != k).map(|i| stress[(i, i)]).fold(f64::NEG_INFINITY, f64::max);
@@ -48,19 +40,24 @@ pub fn p_wave_modulus<L: Law>(law: &L) -> f64 {
 
 /// The out-of-plane Cauchy stress under plane or uniaxial strain, for output. The deformation is embedded in 3D, which is valid for
 /// isotropic laws.
-///
-/// ```
-/// use bfree::material::{Lame, MaterialState, StVenantKirchhoff, out_of_plane_stress};
-/// use bfree::tensor::Tensor;
-///
-/// // Uniaxial strain, small: σ_zz = Λ ε = ν (σ_xx + σ_yy)
-/// let law = StVenantKirchhoff { lame: Lame::from_young_poisson(2.5, 0.25)? };
-/// let strain = 1e-9;
-/// let at = MaterialState::new(Tensor::<f64, 1>::from_element(strain));
-/// assert!((out_of_plane_stress(&law, &at) / (law.lame.lambda * strain) - 1.0).abs() < 1e-8);
-/// # Ok::<(), bfree::material::LameError>(())
-/// ```
-pub fn out_of_plane_stress<L: Law, const D: usize>(law: &L, at: &MaterialState<f64, D>) -> f64 {
+pub(crate) fn out_of_plane_stress<L: Law, const D: usize>(law: &L, at: &MaterialState<f64, D>) -> f64 {
     // σ_zz = P_zz F_zz / J with F_zz = 1
     law.stress(&at.deformed(embed(&at.h)))[(2, 2)] / at.jacobian
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::material::{Lame, NeoHookean, StVenantKirchhoff};
+
+    #[test]
+    fn the_numbers_of_a_law_are_those_of_its_constants() {
+        let law = NeoHookean::logarithmic(Lame::from_young_poisson(100.0, 0.45).unwrap());
+        assert!((poissons_ratio(&law) - 0.45).abs() < 1e-12);
+        // Uniaxial strain, small: σ_zz = Λ ε = ν (σ_xx + σ_yy)
+        let law = StVenantKirchhoff { lame: Lame::from_young_poisson(2.5, 0.25).unwrap() };
+        let strain = 1e-9;
+        let at = MaterialState::new(Tensor::<f64, 1>::from_element(strain));
+        assert!((out_of_plane_stress(&law, &at) / (law.lame.lambda * strain) - 1.0).abs() < 1e-8);
+    }
 }
