@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 /// The most times a step can be halved.
-pub const MAX_HALVINGS: u32 = 20;
+pub(crate) const MAX_HALVINGS: u32 = 20;
 
 /// Ticks per nominal step.
 const TICKS: u64 = 1 << MAX_HALVINGS;
@@ -71,7 +71,7 @@ pub struct Clock {
 }
 
 impl Clock {
-    /// At time zero, with nominal step `dt`, which may be halved `max_halvings` times (at most [`MAX_HALVINGS`]).
+    /// At time zero, with nominal step `dt`, which may be halved `max_halvings` times (at most 20).
     pub fn new(dt: f64, max_halvings: u32) -> Self {
         Self { nominal: dt, max_halvings: max_halvings.min(MAX_HALVINGS), end: None, reached: Reached::default() }
     }
@@ -205,21 +205,7 @@ impl Clock {
     }
 
     /// Moves to t_{n+1} like [`Self::advance`], but a halved step doubles only if it `may`.
-    ///
-    /// ```
-    /// use bfree::clock::Clock;
-    ///
-    /// // After one halving, two steps fill a nominal step, and the third begins the next one.
-    /// let mut clock = Clock::new(1.0, 3);
-    /// assert!(clock.halve() && clock.can_halve());
-    /// for may_grow in [true, false, false] {
-    ///     clock.advance_and_grow_if(may_grow);
-    /// }
-    /// assert_eq!((clock.time(), clock.step()), (1.5, 0.5));
-    /// clock.advance_and_grow_if(true);
-    /// assert_eq!((clock.time(), clock.step()), (2.0, 1.0));
-    /// ```
-    pub fn advance_and_grow_if(&mut self, may: bool) {
+    pub(crate) fn advance_and_grow_if(&mut self, may: bool) {
         self.reached.ticks += TICKS >> self.reached.level;
         self.reached.steps += 1;
         if may && self.reached.level > 0 && self.reached.ticks.is_multiple_of(TICKS >> (self.reached.level - 1)) {
@@ -228,16 +214,7 @@ impl Clock {
     }
 
     /// Whether the step can be halved once more.
-    ///
-    /// ```
-    /// use bfree::clock::Clock;
-    ///
-    /// let mut clock = Clock::new(1.0, 1);
-    /// assert!(clock.can_halve() && clock.halve());
-    /// assert!(!clock.can_halve() && !clock.halve());
-    /// assert_eq!(clock.step(), 0.5);
-    /// ```
-    pub fn can_halve(&self) -> bool {
+    pub(crate) fn can_halve(&self) -> bool {
         self.reached.level < self.max_halvings
     }
 

@@ -136,29 +136,14 @@ impl Kind {
 
 impl Field {
     /// Whether particles have the field only if bodies have inertia.
-    ///
-    /// ```
-    /// use bfree::field::Field;
-    ///
-    /// // Time derivatives need inertia. Fields that follow from the position alone do not.
-    /// assert!(Field::Velocity.needs_inertia() && Field::Acceleration.needs_inertia());
-    /// assert!(!Field::Displacement.needs_inertia() && !Field::Stress.needs_inertia());
-    /// ```
-    pub const fn needs_inertia(&self) -> bool {
+    pub(crate) const fn needs_inertia(&self) -> bool {
         matches!(self, Self::Velocity | Self::Acceleration)
     }
 
     /// The columns that hold the field in a table, for a run in `dimension` dimensions. A scalar has the column `name`. A vector has
     /// `name_x`, … for its first `dimension` components. Principal values have `name_1`, …, and a tensor has `name_xx`, … for all
     /// components.
-    ///
-    /// ```
-    /// use bfree::field::Field;
-    ///
-    /// assert_eq!(Field::Velocity.columns("tip", 2), ["tip_x", "tip_y"]);
-    /// assert_eq!(Field::Jacobian.columns("tip", 2), ["tip"]);
-    /// ```
-    pub fn columns(&self, name: &str, dimension: usize) -> Vec<String> {
+    pub(crate) fn columns(&self, name: &str, dimension: usize) -> Vec<String> {
         let count = if self.kind() == Kind::Vector { dimension } else { usize::MAX };
         self.kind().components().iter().take(count).map(|component| column(name, component)).collect()
     }
@@ -167,4 +152,15 @@ impl Field {
 /// The column that holds a component of `name`.
 pub(crate) fn column(name: &str, component: &str) -> String {
     if component.is_empty() { name.to_owned() } else { format!("{name}_{component}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_vector_has_a_column_for_each_dimension() {
+        assert_eq!(Field::Velocity.columns("tip", 2), ["tip_x", "tip_y"]);
+        assert_eq!(Field::Jacobian.columns("tip", 2), ["tip"]);
+    }
 }

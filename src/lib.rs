@@ -157,6 +157,7 @@ pub mod field;
 pub mod gpu;
 pub mod grid;
 mod lanes;
+mod lists;
 pub mod material;
 pub mod mechanics;
 pub mod memory;

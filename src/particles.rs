@@ -130,7 +130,7 @@ pub(crate) struct Configuration<const D: usize> {
 /// The particles in the reference configuration of the nodal motion φ, that of the last grid reset. The volumes V₀ belong to the undeformed
 /// bodies.
 #[derive(Clone, Copy, Debug)]
-pub struct Reference<'a, const D: usize> {
+pub(crate) struct Reference<'a, const D: usize> {
     /// x
     pub position: &'a [Vector<f64, D>],
     /// H = F − I
@@ -168,9 +168,7 @@ impl<const D: usize> Particles<D> {
 
     /// Makes room for exactly `more` particles, because an array that doubles needs three times its size for a moment. The arrays of
     /// velocity and acceleration grow with the first particle that has inertia.
-    ///
-    /// Example: [`Self::push_without_inertia`].
-    pub fn reserve(&mut self, more: usize) {
+    pub(crate) fn reserve(&mut self, more: usize) {
         let Self { position, displacement_gradient, volume, mass, body, id, .. } = self;
         position.reserve_exact(more);
         displacement_gradient.reserve_exact(more);
@@ -192,7 +190,6 @@ impl<const D: usize> Particles<D> {
     /// use bfree::tensor::Vector;
     ///
     /// let mut particles = Particles::<2>::default();
-    /// particles.reserve(100);
     /// for i in 0..100 {
     ///     particles.push_without_inertia(Vector::from([f64::from(i), 0.0]), 0.5, 2.0, 0);
     /// }
@@ -236,7 +233,7 @@ impl<const D: usize> Particles<D> {
     /// The reference configuration of the nodal motion φ: that of the last grid reset, or the present one if the coming step resets the
     /// grid.
     #[inline(always)]
-    pub fn reference(&self) -> Reference<'_, D> {
+    pub(crate) fn reference(&self) -> Reference<'_, D> {
         let (position, displacement_gradient, dilatation) = match &self.reference {
             None => (&self.position, &self.displacement_gradient, &self.dilatation),
             Some(stored) => (&stored.position, &stored.displacement_gradient, &stored.dilatation),

@@ -13,6 +13,9 @@ pub type Vector<T, const D: usize> = SVector<T, D>;
 /// A second-order tensor of `D`×`D` components.
 pub type Tensor<T, const D: usize> = SMatrix<T, D, D>;
 
+/// Rows and columns of the six numbers of a symmetric tensor in three dimensions.
+pub(crate) const SYMMETRIC: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)];
+
 /// The identity tensor.
 ///
 /// ```
@@ -101,19 +104,8 @@ pub fn scaled<T: Real, const D: usize>(a: &Tensor<T, D>, s: T) -> Tensor<T, D> {
 }
 
 /// The cofactor, cof A = det(A) A⁻ᵀ, for D = 1, 2, 3; defined for singular A too.
-///
-/// ```
-/// use bfree::tensor::{Tensor, Vector, cofactor, determinant, identity};
-///
-/// // cof(A)ᵀ A = det(A) I
-/// let a = Tensor::<f64, 3>::new(2.0, 1.0, 0.0, 0.0, 3.0, 1.0, 1.0, 0.0, 1.0);
-/// assert_eq!(cofactor(&a).transpose() * a, identity::<f64, 3>() * determinant(&a));
-/// // Nanson: cof F maps areas. In a body flattened along x, a face normal to x keeps its area, and a face normal to y loses it.
-/// let flat = Tensor::<f64, 2>::from_diagonal(&Vector::from([0.0, 1.0]));
-/// assert_eq!(cofactor(&flat), Tensor::from_diagonal(&Vector::from([1.0, 0.0])));
-/// ```
 #[inline(always)]
-pub fn cofactor<T: Real, const D: usize>(a: &Tensor<T, D>) -> Tensor<T, D> {
+pub(crate) fn cofactor<T: Real, const D: usize>(a: &Tensor<T, D>) -> Tensor<T, D> {
     match D {
         1 => identity(),
         2 => Tensor::from_fn(|i, k| {
@@ -129,19 +121,8 @@ pub fn cofactor<T: Real, const D: usize>(a: &Tensor<T, D>) -> Tensor<T, D> {
 }
 
 /// The derivative of cof A along X. It is linear in X, and defined for singular A too.
-///
-/// ```
-/// use bfree::tensor::{Tensor, cofactor, cofactor_derivative};
-///
-/// // cof is homogeneous of degree 2 in 3D, so the derivative along A is 2 cof A.
-/// let a = Tensor::<f64, 3>::new(2.0, 1.0, 0.0, 0.0, 3.0, 1.0, 1.0, 0.0, 1.0);
-/// assert_eq!(cofactor_derivative(&a, &a), cofactor(&a) * 2.0);
-/// // The derivative is linear in X to the last bit: an X that is 2⁻⁶⁰ times as large has a derivative that is 2⁻⁶⁰ times as large.
-/// let x = Tensor::<f64, 3>::new(0.1, -0.7, 0.3, 0.2, 0.9, -0.4, 0.8, 0.5, 0.6);
-/// assert_eq!(cofactor_derivative(&a, &(x * 2.0_f64.powi(-60))), cofactor_derivative(&a, &x) * 2.0_f64.powi(-60));
-/// ```
 #[inline(always)]
-pub fn cofactor_derivative<T: Real, const D: usize>(a: &Tensor<T, D>, x: &Tensor<T, D>) -> Tensor<T, D> {
+pub(crate) fn cofactor_derivative<T: Real, const D: usize>(a: &Tensor<T, D>, x: &Tensor<T, D>) -> Tensor<T, D> {
     match D {
         1 => Tensor::zeros(),
         2 => cofactor(x),
@@ -405,5 +386,29 @@ impl<T: Real, const D: usize> Deformation<T, D> {
             series = series * s2 + T::lit(1.0 / (2 * k + 1) as f64);
         }
         self.j * s - T::lit(2.0) * s2 * s * series
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_cofactor_is_defined_for_singular_tensors_too() {
+        // cof(A)ᵀ A = det(A) I
+        let a = Tensor::<f64, 3>::new(2.0, 1.0, 0.0, 0.0, 3.0, 1.0, 1.0, 0.0, 1.0);
+        assert_eq!(cofactor(&a).transpose() * a, identity::<f64, 3>() * determinant(&a));
+        // Nanson: cof F maps areas. In a body flattened along x, a face normal to x keeps its area, and a face normal to y loses it.
+        let flat = Tensor::<f64, 2>::from_diagonal(&Vector::from([0.0, 1.0]));
+        assert_eq!(cofactor(&flat), Tensor::from_diagonal(&Vector::from([1.0, 0.0])));
+    }
+
+    #[test]
+    fn the_derivative_of_the_cofactor_is_linear_to_the_last_bit() {
+        // cof is homogeneous of degree 2 in 3D, so the derivative along A is 2 cof A.
+        let a = Tensor::<f64, 3>::new(2.0, 1.0, 0.0, 0.0, 3.0, 1.0, 1.0, 0.0, 1.0);
+        assert_eq!(cofactor_derivative(&a, &a), cofactor(&a) * 2.0);
+        let (x, small) = (Tensor::<f64, 3>::new(0.1, -0.7, 0.3, 0.2, 0.9, -0.4, 0.8, 0.5, 0.6), 2.0_f64.powi(-60));
+        assert_eq!(cofactor_derivative(&a, &(x * small)), cofactor_derivative(&a, &x) * small);
     }
 }

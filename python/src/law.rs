@@ -1,7 +1,8 @@
 //! The law of a body: one of the shipped ones, or that of an energy in Python.
 
 use crate::energy::Recorded;
-use bfree::material::{FromEnergy, Material, stiffness_at_rest};
+use bfree::material::{FromEnergy, Law as _, Material, MaterialState};
+use bfree::tensor::Tensor;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use verification::check_material;
@@ -11,6 +12,21 @@ const ROUNDING: f64 = 1e-9;
 
 /// Failed checks that an error lists.
 const SHOWN: usize = 8;
+
+/// The least and the largest eigenvalue of ℂ of the body at rest, for strains of size 1. If the least one is negative, the body is
+/// unstable.
+fn stiffness_at_rest(law: &FromEnergy<Recorded>) -> [f64; 2] {
+    // An orthonormal basis of the symmetric strains.
+    let basis = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)].map(|(i, j)| {
+        let mut strain = Tensor::<f64, 3>::zeros();
+        (strain[(i, j)], strain[(j, i)]) = if i == j { (1.0, 1.0) } else { (0.5_f64.sqrt(), 0.5_f64.sqrt()) };
+        strain
+    });
+    let stresses = basis.map(|strain| law.elasticity(&MaterialState::new(Tensor::zeros()), &strain));
+    let stiffness = Tensor::<f64, 6>::from_fn(|row, column| stresses[column].dot(&basis[row]));
+    let values = ((stiffness + stiffness.transpose()) * 0.5).symmetric_eigenvalues();
+    [values.min(), values.max()]
+}
 
 /// A law from its strain energy density W(E), a function of the 3×3 Green–Lagrange strain, written in Python.
 #[pyclass(frozen, module = "bfree")]

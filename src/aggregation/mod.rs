@@ -24,6 +24,7 @@ mod pieces;
 pub use bodies::Occupied;
 pub use pieces::Pieces;
 
+use crate::lists::Lists;
 use crate::parallel;
 use bodies::Bodies;
 
@@ -33,49 +34,45 @@ use bodies::Bodies;
 pub struct Extension {
     /// The polynomial degree of the shape functions.
     degree: u32,
-    /// The outer nodes, ascending.
-    outer: Vec<u32>,
-    /// For each outer node, the start of its row in `leaders` and `weights`; the last entry is the end of the last row.
-    starts: Vec<u32>,
-    leaders: Vec<u32>,
-    weights: Vec<f64>,
-    transpose: Transpose,
+    /// The outer nodes, with the inner nodes that each follows.
+    outer: Rows,
+    /// Eᵀ: the inner nodes that outer nodes follow, with the places of their outer nodes, ascending.
+    inner: Rows,
 }
 
-/// Eᵀ: the rows of an extension, sorted by inner node.
+/// Sparse rows.
 #[derive(Clone, Debug, Default, PartialEq)]
-struct Transpose {
-    /// The inner nodes that outer nodes follow, ascending.
-    inner: Vec<u32>,
-    /// For each of these nodes, the start of its row in `followers` and `weights`; the last entry is the end of the last row.
-    starts: Vec<u32>,
-    /// Places of outer nodes.
-    followers: Vec<u32>,
-    weights: Vec<f64>,
+pub(crate) struct Rows {
+    /// The node of each row, ascending.
+    pub(crate) nodes: Vec<u32>,
+    pub(crate) entries: Lists<u32>,
+    pub(crate) weights: Vec<f64>,
 }
 
-impl Transpose {
-    fn of(extension: &Extension) -> Self {
-        let nodes = extension.leaders.iter().max().map_or(0, |&last| last as usize + 1);
-        let mut ends = vec![0_u32; nodes];
-        extension.leaders.iter().for_each(|&leader| ends[leader as usize] += 1);
-        let mut transpose = Self { starts: vec![0], ..Self::default() };
-        let mut end = 0;
-        for (node, count) in ends.iter_mut().enumerate().filter(|(_, count)| **count > 0) {
-            transpose.inner.push(node as u32);
-            (*count, end) = (end, end + *count);
-            transpose.starts.push(end);
+impl Rows {
+    fn row(&self, place: usize) -> impl Iterator<Item = (usize, f64)> + use<'_> {
+        let (entries, weights) = (self.entries.row(place), &self.weights[self.entries.range(place)]);
+        entries.iter().zip(weights).map(|(&entry, &weight)| (entry as usize, weight))
+    }
+
+    /// The rows of the transpose that are not empty. Their entries are places in these rows.
+    fn transposed(&self) -> Self {
+        let [_, entries] = self.entries.arrays();
+        let count = entries.iter().max().map_or(0, |&last| last as usize + 1);
+        let (places, owners) = (Lists::of_places(entries, count), self.entries.owners());
+        let mut transposed = Self::default();
+        for node in (0..count).filter(|&node| !places.row(node).is_empty()) {
+            let row = places.row(node).iter().map(|&place| place as usize);
+            transposed.nodes.push(node as u32);
+            transposed.entries.push(row.clone().map(|place| owners[place]));
+            transposed.weights.extend(row.map(|place| self.weights[place]));
         }
-        transpose.followers = vec![0; extension.leaders.len()];
-        transpose.weights = vec![0.0; extension.leaders.len()];
-        for place in 0..extension.len() {
-            for (leader, weight) in extension.leaders(place) {
-                let at = ends[leader] as usize;
-                (transpose.followers[at], transpose.weights[at]) = (place as u32, weight);
-                ends[leader] += 1;
-            }
-        }
-        transpose
+        transposed
+    }
+
+    fn bytes(&self) -> usize {
+        let [starts, entries] = self.entries.arrays();
+        size_of_val(&*self.nodes) + size_of_val(starts) + size_of_val(entries) + size_of_val(&*self.weights)
     }
 }
 
@@ -107,31 +104,29 @@ impl Extension {
             let nearest = bodies.nearest(node, &is_good);
             (!nearest.is_empty()).then(|| bodies.row(node, &nearest))
         });
-        let mut extension = Self { degree: pieces.degree, starts: vec![0], ..Self::default() };
+        let mut all = Rows::default();
         for (node, row) in outer.into_iter().zip(rows).filter_map(|(node, row)| Some((node, row?))) {
-            extension.outer.push(node);
-            for (leader, weight) in row.into_iter().filter(|(_, weight)| *weight != 0.0) {
-                extension.leaders.push(leader);
-                extension.weights.push(weight);
-            }
-            extension.starts.push(extension.leaders.len() as u32);
+            let row = row.into_iter().filter(|(_, weight)| *weight != 0.0);
+            let (leaders, weights): (Vec<u32>, Vec<f64>) = row.unzip();
+            all.nodes.push(node);
+            all.entries.push(leaders);
+            all.weights.extend(weights);
         }
-        extension.transpose = Transpose::of(&extension);
-        extension
+        Self { degree: pieces.degree, inner: all.transposed(), outer: all }
     }
 
     /// The extension of several parts that share no nodes, in ascending order: each with the number of its first node.
     pub(crate) fn joined(degree: u32, parts: impl Iterator<Item = (usize, Self)>) -> Self {
-        let mut all = Self { degree, starts: vec![0], ..Self::default() };
-        for (first, part) in parts {
-            let (first, rows) = (first as u32, all.leaders.len() as u32);
-            all.outer.extend(part.outer.iter().map(|outer| first + outer));
-            all.starts.extend(part.starts.iter().skip(1).map(|start| rows + start));
-            all.leaders.extend(part.leaders.iter().map(|leader| first + leader));
-            all.weights.extend(part.weights);
+        let mut all = Rows::default();
+        for (first, Self { outer, .. }) in parts {
+            let first = first as u32;
+            all.nodes.extend(outer.nodes.iter().map(|node| first + node));
+            for place in 0..outer.nodes.len() {
+                all.entries.push(outer.entries.row(place).iter().map(|leader| first + leader));
+            }
+            all.weights.extend(outer.weights);
         }
-        all.transpose = Transpose::of(&all);
-        all
+        Self { degree, inner: all.transposed(), outer: all }
     }
 
     /// The degree of the functions, 1 to 3.
@@ -141,47 +136,46 @@ impl Extension {
 
     /// Number of outer nodes.
     pub fn len(&self) -> usize {
-        self.outer.len()
+        self.outer.nodes.len()
     }
 
     /// Whether every node is an unknown.
     pub fn is_empty(&self) -> bool {
-        self.outer.is_empty()
+        self.outer.nodes.is_empty()
     }
 
     /// The outer nodes, ascending.
     pub fn outer(&self) -> &[u32] {
-        &self.outer
+        &self.outer.nodes
     }
 
     /// The inner nodes that the outer node `outer()[place]` follows, and their weights.
     pub(crate) fn leaders(&self, place: usize) -> impl Iterator<Item = (usize, f64)> + use<'_> {
-        let range = self.starts[place] as usize..self.starts[place + 1] as usize;
-        self.leaders[range.clone()].iter().zip(&self.weights[range]).map(|(&leader, &weight)| (leader as usize, weight))
+        self.outer.row(place)
     }
 
     /// Every outer node with the inner nodes that it follows, and their weights.
     pub fn rows(&self) -> impl Iterator<Item = (usize, impl Iterator<Item = (usize, f64)>)> {
-        self.outer.iter().enumerate().map(|(place, &outer)| (outer as usize, self.leaders(place)))
+        self.outer.nodes.iter().enumerate().map(|(place, &outer)| (outer as usize, self.leaders(place)))
     }
 
     /// Bytes of all lists.
     pub(crate) fn bytes(&self) -> usize {
-        let Self { outer, starts, leaders, weights, transpose, .. } = self;
-        let numbers = outer.len() + starts.len() + leaders.len();
-        let transposed = transpose.inner.len() + transpose.starts.len() + transpose.followers.len();
-        (numbers + transposed) * size_of::<u32>() + (weights.len() + transpose.weights.len()) * size_of::<f64>()
+        self.outer.bytes() + self.inner.bytes()
     }
 
     /// The inner nodes that outer nodes follow, ascending.
     pub(crate) fn inner(&self) -> &[u32] {
-        &self.transpose.inner
+        &self.inner.nodes
     }
 
     /// The places of the outer nodes that follow the inner node at `place` of [`Self::inner`], ascending, with their weights.
     pub(crate) fn followers(&self, place: usize) -> impl Iterator<Item = (usize, f64)> + use<'_> {
-        let Transpose { starts, followers, weights, .. } = &self.transpose;
-        let range = starts[place] as usize..starts[place + 1] as usize;
-        followers[range.clone()].iter().zip(&weights[range]).map(|(&outer, &weight)| (outer as usize, weight))
+        self.inner.row(place)
+    }
+
+    /// The rows of E and of Eᵀ.
+    pub(crate) fn both(&self) -> [&Rows; 2] {
+        [&self.outer, &self.inner]
     }
 }

@@ -106,7 +106,7 @@ pub enum Parameters {
 
 /// The data of a scene on which shape functions depend, besides their own parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Cells {
+pub(crate) struct Cells {
     /// The number of dimensions D.
     pub dimension: usize,
     /// Particles along each axis of a cell.
@@ -132,18 +132,7 @@ impl Parameters {
     }
 
     /// Makes the functions. If keys below `path` are wrong, the result is `None` and `problems` lists them.
-    ///
-    /// ```
-    /// use bfree::approximation::{Gimp, Cells, Parameters};
-    /// use bfree::scene::Problems;
-    ///
-    /// let written: Parameters = serde_json::from_str(r#""gimp""#)?;
-    /// let cells = Cells { dimension: 2, particles_per_axis: 2, integrated: false };
-    /// let functions = written.functions(cells, &mut Problems::default(), "approximation");
-    /// assert_eq!(functions, Some(Gimp { half_width: 0.25 }.into()));
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    pub fn functions(&self, cells: Cells, problems: &mut Problems, path: &str) -> Option<Approximation> {
+    pub(crate) fn functions(&self, cells: Cells, problems: &mut Problems, path: &str) -> Option<Approximation> {
         let path = format!("{path}.{}", self.key());
         Some(match self {
             Self::Linear => Linear.into(),

@@ -1,18 +1,18 @@
 //! The device: its memory, and the launches of its kernels. Foreign code is called here alone.
 #![allow(unsafe_code)]
 
+use crate::parallel::held;
 use crate::space::vector::CHUNK;
 use bytemuck::Pod;
 use cudarc::driver::sys::{self, CUfunction_attribute};
 use cudarc::driver::{
     CudaContext, CudaFunction, CudaModule, CudaSlice, CudaStream, DevicePtr, DeviceRepr, DriverError, LaunchConfig,
-    PushKernelArg, result,
+    PushKernelArg, ValidAsZeroBits, result,
 };
 use cudarc::nvrtc::Ptx;
 use rustc_hash::FxHashMap;
 use std::fmt::{Debug, Formatter};
-use std::marker::PhantomData;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard};
 
 /// The kernels of `kernels/kernels.cu`.
 const KERNELS: &str = include_str!("kernels/kernels.ptx");
@@ -31,6 +31,20 @@ const LEAST_DRIVER: i32 = 12_000;
 
 /// The least compute capability, major version.
 const LEAST_CAPABILITY: i32 = 8;
+
+/// The argument of a kernel: a struct with the layout and the names of that in the kernel's source.
+macro_rules! arguments {
+    ($($field:ident $(: $value:expr)?),+ $(,)?) => {{
+        #[derive(Clone, Copy)]
+        #[repr(C)]
+        #[allow(non_camel_case_types)]
+        struct Arguments<$($field),+> {
+            $($field: $field),+
+        }
+        Arguments { $($field $(: $value)?),+ }
+    }};
+}
+pub(super) use arguments;
 
 /// A failure of the device or its driver.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -149,11 +163,6 @@ fn keep_memory(context: &CudaContext) -> Result<(), DriverError> {
     }
 }
 
-/// The contents of a mutex. No code that holds one panics.
-fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
 fn name_of(error: DriverError) -> String {
     let named = error.error_name().ok().and_then(|name| name.to_str().ok().map(str::to_owned));
     named.unwrap_or_else(|| format!("error {}", error.0 as u32))
@@ -218,18 +227,18 @@ impl Gpu {
     /// # Errors
     /// A call of the driver failed. Vectors and results since then mean nothing.
     pub fn check(&self) -> Result<(), GpuError> {
-        locked(&self.failure).clone().map_or(Ok(()), Err)
+        held(&self.failure).clone().map_or(Ok(()), Err)
     }
 
     /// Keeps the failure, if it is the first one.
     pub(super) fn keep_failure(&self, result: Result<(), GpuError>) {
         if let Err(failure) = result {
-            locked(&self.failure).get_or_insert(failure);
+            held(&self.failure).get_or_insert(failure);
         }
     }
 
     fn has_failed(&self) -> bool {
-        locked(&self.failure).is_some()
+        held(&self.failure).is_some()
     }
 
     /// Keeps the first failure.
@@ -239,59 +248,54 @@ impl Gpu {
             Err(error) => error,
         };
         let failure = GpuError::Driver { call: call.to_owned(), error: name_of(error) };
-        locked(&self.failure).get_or_insert(failure);
+        held(&self.failure).get_or_insert(failure);
         None
     }
 
     /// Memory whose contents are unspecified.
-    pub(crate) fn memory_for<T: Pod>(&self, len: usize) -> Buffer<T> {
-        let bytes = (len * size_of::<T>()).max(1);
-        let memory = if self.has_failed() { None } else { self.allocate(bytes) };
-        Buffer { memory, len, of: PhantomData }
+    pub(crate) fn memory_for<T: Number>(&self, len: usize) -> Buffer<T> {
+        let memory = if self.has_failed() { None } else { self.allocate(len.max(1)) };
+        Buffer { memory, len }
     }
 
-    fn allocate(&self, bytes: usize) -> Option<CudaSlice<u8>> {
+    fn allocate<T: Number>(&self, len: usize) -> Option<CudaSlice<T>> {
         // SAFETY: any bytes are numbers of the plain types that buffers hold, and whoever takes a buffer writes it first.
-        let memory = unsafe { self.stream.alloc::<u8>(bytes) };
+        let memory = unsafe { self.stream.alloc(len) };
         if memory.as_ref().is_err_and(|error| error.0 == sys::CUresult::CUDA_ERROR_OUT_OF_MEMORY) {
+            let bytes = len * size_of::<T>();
             let (free, total) = self.memory().unwrap_or_default();
-            locked(&self.failure).get_or_insert(GpuError::Memory { bytes, free, total });
+            held(&self.failure).get_or_insert(GpuError::Memory { bytes, free, total });
         }
         self.keep("an allocation", memory)
     }
 
     /// A copy of the numbers on the device.
-    pub(crate) fn copy_of<T: Pod>(&self, numbers: &[T]) -> Buffer<T> {
+    pub(crate) fn copy_of<T: Number>(&self, numbers: &[T]) -> Buffer<T> {
         let mut buffer = self.memory_for(numbers.len());
         self.write_at(numbers, &mut buffer, 0);
         buffer
     }
 
     /// Writes numbers into a buffer, from an index on. They have room there.
-    pub(crate) fn write_at<T: Pod>(&self, numbers: &[T], buffer: &mut Buffer<T>, at: usize) {
+    pub(crate) fn write_at<T: Number>(&self, numbers: &[T], buffer: &mut Buffer<T>, at: usize) {
         if let Some(memory) = buffer.memory.as_mut().filter(|_| !numbers.is_empty() && !self.has_failed()) {
-            let bytes: &[u8] = bytemuck::cast_slice(numbers);
-            let from = size_of::<T>() * at;
-            let mut part = memory.slice_mut(from..from + bytes.len());
-            let copied = self.stream.memcpy_htod(bytes, &mut part);
+            let copied = self.stream.memcpy_htod(numbers, &mut memory.slice_mut(at..at + numbers.len()));
             // The numbers may go away before the copy is made.
             _ = self.keep("a copy to the device", copied.and_then(|()| self.stream.synchronize()));
         }
     }
 
     /// Reads numbers from a buffer, from an index on. They exist there. After a failure the numbers stay unchanged.
-    pub(crate) fn read_at<T: Pod>(&self, buffer: &Buffer<T>, at: usize, numbers: &mut [T]) {
+    pub(crate) fn read_at<T: Number>(&self, buffer: &Buffer<T>, at: usize, numbers: &mut [T]) {
         let Some(memory) = buffer.memory.as_ref().filter(|_| !numbers.is_empty() && !self.has_failed()) else { return };
-        let from = size_of::<T>() * at;
-        let bytes: &mut [u8] = bytemuck::cast_slice_mut(numbers);
-        let copied = self.stream.memcpy_dtoh(&memory.slice(from..from + bytes.len()), bytes);
+        let copied = self.stream.memcpy_dtoh(&memory.slice(at..at + numbers.len()), numbers);
         // The copy may still be under way.
         _ = self.keep("a copy from the device", copied.and_then(|()| self.stream.synchronize()));
     }
 
     /// Calls `fill` with memory for `count` partial sums, and adds them in their order; NaN after a failure.
     pub(super) fn sum(&self, count: usize, fill: impl FnOnce(u64)) -> f64 {
-        let (on_device, numbers) = &mut *locked(&self.partial);
+        let (on_device, numbers) = &mut *held(&self.partial);
         if on_device.as_ref().is_none_or(|partial| partial.len() < count) {
             *on_device = Some(self.memory_for(count));
         }
@@ -306,22 +310,22 @@ impl Gpu {
 
     /// Excludes other threads of the program while several launches share memory.
     pub(super) fn lock(&self) -> MutexGuard<'_, ()> {
-        locked(&self.in_use)
+        held(&self.in_use)
     }
 
     /// Sets all bytes of a buffer to zero.
-    pub(crate) fn clear<T: Pod>(&self, buffer: &mut Buffer<T>) {
-        let bytes = buffer.len * size_of::<T>();
-        if let Some(memory) = buffer.memory.as_mut().filter(|_| bytes > 0 && !self.has_failed()) {
-            _ = self.keep("clearing memory", self.stream.memset_zeros(&mut memory.slice_mut(..bytes)));
+    pub(crate) fn clear<T: Number>(&self, buffer: &mut Buffer<T>) {
+        let len = buffer.len;
+        if let Some(memory) = buffer.memory.as_mut().filter(|_| len > 0 && !self.has_failed()) {
+            _ = self.keep("clearing memory", self.stream.memset_zeros(&mut memory.slice_mut(..len)));
         }
     }
 
     /// Copies one buffer into another of the same length.
-    pub(crate) fn copy<T: Pod>(&self, from: &Buffer<T>, to: &mut Buffer<T>) {
-        let bytes = from.len.min(to.len) * size_of::<T>();
-        if let (Some(from), Some(to), false) = (&from.memory, &mut to.memory, bytes == 0 || self.has_failed()) {
-            let (from, mut to) = (from.slice(..bytes), to.slice_mut(..bytes));
+    pub(crate) fn copy<T: Number>(&self, from: &Buffer<T>, to: &mut Buffer<T>) {
+        let len = from.len.min(to.len);
+        if let (Some(from), Some(to), false) = (&from.memory, &mut to.memory, len == 0 || self.has_failed()) {
+            let (from, mut to) = (from.slice(..len), to.slice_mut(..len));
             _ = self.keep("a copy on the device", self.stream.memcpy_dtod(&from, &mut to));
         }
     }
@@ -350,7 +354,7 @@ impl Gpu {
 
     /// A kernel that may have so much shared memory, and takes an argument of so many bytes.
     fn function(&self, kernel: &'static str, shared: usize, argument: usize) -> Option<CudaFunction> {
-        let mut functions = locked(&self.functions);
+        let mut functions = held(&self.functions);
         if !functions.contains_key(kernel) && !KERNELS.contains(&format!(" {kernel}_param_0[{argument}]")) {
             let (call, error) = (kernel.to_owned(), format!("it takes no argument of {argument} bytes"));
             self.keep_failure(Err(GpuError::Driver { call, error }));
@@ -377,13 +381,18 @@ struct Argument<T>(T);
 // SAFETY: plain data, with the layout of the struct in the kernel's source.
 unsafe impl<T: Copy> DeviceRepr for Argument<T> {}
 
+/// Plain numbers that a device can hold.
+pub(crate) trait Number: Pod + DeviceRepr + ValidAsZeroBits {}
+
+impl<T: Pod + DeviceRepr + ValidAsZeroBits> Number for T {}
+
 /// Numbers in the device's memory.
 #[derive(Debug)]
 pub(crate) struct Buffer<T> {
     /// `None` if the device had failed before.
-    memory: Option<CudaSlice<u8>>,
+    memory: Option<CudaSlice<T>>,
+    /// Number of numbers. The memory has at least one.
     len: usize,
-    of: PhantomData<T>,
 }
 
 impl<T> Drop for Buffer<T> {

@@ -1,11 +1,13 @@
 //! Nodes that follow others, and values that are fixed, on a device (`kernels/data.h`).
 
-use super::device::{Buffer, Gpu};
+use super::device::{Buffer, Gpu, arguments};
 use super::vectors::GpuVector;
+use crate::aggregation::Rows;
 
 /// E, by which outer nodes follow inner ones, on a device.
 #[derive(Debug)]
 pub(crate) struct Followers {
+    /// The nodes of the rows, the starts of the rows, and their entries.
     outer: [Buffer<u32>; 3],
     follows: Buffer<u8>,
     leader_weights: Buffer<f64>,
@@ -15,53 +17,21 @@ pub(crate) struct Followers {
     dimension: usize,
 }
 
-/// `Followers` of `kernels/data.h`.
-#[derive(Clone, Copy)]
-#[repr(C)]
-struct FollowersArguments {
-    outer: u64,
-    follows: u64,
-    leader_first: u64,
-    leaders: u64,
-    leader_weights: u64,
-    outer_count: i64,
-    inner: u64,
-    follower_first: u64,
-    followers: u64,
-    follower_weights: u64,
-    inner_count: i64,
-    field: u64,
-    moved: u64,
-    dimension: i32,
-}
-
-/// Sparse rows: the number of each row, and its entries with weights.
-pub(crate) type SparseRows<'a> = &'a mut dyn Iterator<Item = (u32, Vec<(u32, f64)>)>;
-
-/// Numbers of rows, starts of rows, entries, weights.
-fn flat(rows: SparseRows<'_>) -> ([Vec<u32>; 3], Vec<f64>) {
-    let (mut numbers, mut starts, mut entries, mut weights) = (Vec::new(), vec![0], Vec::new(), Vec::new());
-    for (number, row) in rows {
-        numbers.push(number);
-        entries.extend(row.iter().map(|&(entry, _)| entry));
-        weights.extend(row.iter().map(|&(_, weight)| weight));
-        starts.push(entries.len() as u32);
-    }
-    ([numbers, starts, entries], weights)
-}
-
 impl Followers {
     /// The outer nodes with their inner ones, the inner nodes with the places of their outer ones, and whether each component of an outer node
     /// follows.
-    pub(crate) fn new(gpu: &Gpu, outer: SparseRows<'_>, inner: SparseRows<'_>, follows: &[bool]) -> Self {
-        let ((outer, leader_weights), (inner, follower_weights)) = (flat(outer), flat(inner));
+    pub(crate) fn new(gpu: &Gpu, [outer, inner]: [&Rows; 2], follows: &[bool]) -> Self {
+        let numbers = |of: &Rows| {
+            let [starts, entries] = of.entries.arrays();
+            [&of.nodes, starts, entries].map(|list| gpu.copy_of(list))
+        };
         let follows: Vec<u8> = follows.iter().map(|&one| u8::from(one)).collect();
         Self {
-            dimension: follows.len() / outer[0].len().max(1),
-            outer: outer.map(|list| gpu.copy_of(&list)),
-            leader_weights: gpu.copy_of(&leader_weights),
-            inner: inner.map(|list| gpu.copy_of(&list)),
-            follower_weights: gpu.copy_of(&follower_weights),
+            dimension: follows.len() / outer.nodes.len().max(1),
+            outer: numbers(outer),
+            leader_weights: gpu.copy_of(&outer.weights),
+            inner: numbers(inner),
+            follower_weights: gpu.copy_of(&inner.weights),
             moved: gpu.memory_for(follows.len()),
             follows: gpu.copy_of(&follows),
         }
@@ -70,7 +40,8 @@ impl Followers {
     fn launch(&self, gpu: &Gpu, kernel: &'static str, count: usize, field: &GpuVector) {
         let ([outer, leader_first, leaders], [inner, follower_first, followers]) =
             (self.outer.each_ref().map(Buffer::address), self.inner.each_ref().map(Buffer::address));
-        let arguments = FollowersArguments {
+        // `Followers` of `kernels/data.h`.
+        let arguments = arguments! {
             outer,
             follows: self.follows.address(),
             leader_first,
@@ -101,17 +72,9 @@ impl Followers {
     }
 }
 
-/// `Fixed` of `kernels/data.h`.
-#[derive(Clone, Copy)]
-#[repr(C)]
-struct FixedArguments {
-    fixed: u64,
-    field: u64,
-    n: i64,
-}
-
 /// Sets the fixed values of a field to zero.
 pub(crate) fn clear_fixed(gpu: &Gpu, fixed: &Buffer<u8>, field: &mut GpuVector) {
     let n = fixed.len();
-    gpu.launch_for("clear_fixed", n, &FixedArguments { fixed: fixed.address(), field: field.address(), n: n as i64 });
+    // `Fixed` of `kernels/data.h`.
+    gpu.launch_for("clear_fixed", n, &arguments! { fixed: fixed.address(), field: field.address(), n: n as i64 });
 }

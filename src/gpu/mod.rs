@@ -12,8 +12,6 @@ mod followers;
 mod multigrid;
 mod points;
 mod product;
-#[cfg(test)]
-mod record;
 mod rows;
 mod transfer;
 mod vectors;
@@ -27,3 +25,6 @@ pub(crate) use product::{Inertia, Masses, Product, SETS};
 pub(crate) use rows::{Cells, Rows};
 pub(crate) use transfer::{Transfer, TransferArrays};
 pub use vectors::GpuVector;
+
+#[cfg(test)]
+mod tests;

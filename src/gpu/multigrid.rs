@@ -1,8 +1,9 @@
 //! The levels and the filter of multigrid on a device (`kernels/multigrid.h`).
 
-use super::device::{Buffer, Gpu};
+use super::device::{Buffer, Gpu, arguments};
 use super::followers::{Followers, clear_fixed};
 use super::vectors::GpuVector;
+use crate::lists::Lists;
 use crate::space::vector::Vectors;
 
 /// Places of a stencil.
@@ -21,9 +22,8 @@ pub(crate) struct LevelArrays<'a> {
     pub held: &'a [bool],
     /// Whether a value of the finer level is no unknown.
     pub fixed_finer: &'a [bool],
-    /// The coarse nodes around each finer node: starts and entries; and the finer nodes that are interpolated from each coarse node.
-    pub around: [&'a [u32]; 2],
-    pub within: [&'a [u32]; 2],
+    /// The coarse nodes around each finer node, and the finer nodes that are interpolated from each coarse node.
+    pub interpolation: [&'a Lists<u32>; 2],
     /// E, by which outer nodes follow others.
     pub followers: Option<Followers>,
 }
@@ -37,34 +37,8 @@ pub(crate) struct Level {
     inverse: Buffer<f64>,
     held: Buffer<u8>,
     fixed_finer: Buffer<u8>,
-    lists: [Buffer<u32>; 4],
+    lists: [[Buffer<u32>; 2]; 2],
     followers: Option<Followers>,
-}
-
-/// `Stencil` of `kernels/multigrid.h`.
-#[derive(Clone, Copy)]
-#[repr(C)]
-struct StencilArguments {
-    neighbours: u64,
-    entries: u64,
-    held: u64,
-    x: u64,
-    y: u64,
-    nodes: i64,
-    dimension: i32,
-}
-
-/// `Interpolation` of `kernels/multigrid.h`.
-#[derive(Clone, Copy)]
-#[repr(C)]
-struct InterpolationArguments {
-    lists: [u64; 4],
-    fixed: u64,
-    held: u64,
-    x: u64,
-    y: u64,
-    n: i64,
-    dimension: i32,
 }
 
 /// `[node][number]` as `[number][node]`, so that neighbouring threads read neighbouring numbers.
@@ -83,7 +57,7 @@ fn bytes(of: &[bool]) -> Vec<u8> {
 
 impl Level {
     pub(crate) fn new(gpu: &Gpu, arrays: LevelArrays<'_>) -> Self {
-        let LevelArrays { dimension, neighbours, entries, inverse, held, fixed_finer, around, within, followers } =
+        let LevelArrays { dimension, neighbours, entries, inverse, held, fixed_finer, interpolation, followers } =
             arrays;
         Self {
             dimension,
@@ -92,7 +66,7 @@ impl Level {
             inverse: gpu.copy_of(inverse),
             held: gpu.copy_of(&bytes(held)),
             fixed_finer: gpu.copy_of(&bytes(fixed_finer)),
-            lists: [around[0], around[1], within[0], within[1]].map(|list| gpu.copy_of(list)),
+            lists: interpolation.map(|lists| lists.arrays().map(|list| gpu.copy_of(list))),
             followers,
         }
     }
@@ -120,7 +94,8 @@ impl Level {
         }
         let x = extended.as_deref().unwrap_or(x);
         let nodes = self.held.len() / self.dimension;
-        let arguments = StencilArguments {
+        // `Stencil` of `kernels/multigrid.h`.
+        let arguments = arguments! {
             neighbours: self.neighbours.address(),
             entries: self.entries.address(),
             held: self.held_at_once(),
@@ -140,8 +115,9 @@ impl Level {
 
     fn interpolate(&self, gpu: &Gpu, kernel: &'static str, held: u64, x: &GpuVector, y: &mut GpuVector) {
         let n = y.0.len();
-        let arguments = InterpolationArguments {
-            lists: self.lists.each_ref().map(Buffer::address),
+        // `Interpolation` of `kernels/multigrid.h`.
+        let arguments = arguments! {
+            lists: self.lists.each_ref().map(|lists| lists.each_ref().map(Buffer::address)),
             fixed: self.fixed_finer.address(),
             held,
             x: x.address(),

@@ -1,8 +1,8 @@
 //! The linearised forces of surface points on a device (`kernels/points.h`).
 
-use super::device::{Buffer, Gpu};
-use super::transfer::by_node;
+use super::device::{Buffer, Gpu, arguments};
 use super::vectors::GpuVector;
+use crate::lists::Lists;
 
 /// Components of the motion of a free obstacle.
 const MOTION: usize = 6;
@@ -47,26 +47,6 @@ pub(crate) struct Points {
     weights_by_node: Buffer<f64>,
 }
 
-/// `Points` of `kernels/points.h`.
-#[derive(Clone, Copy)]
-#[repr(C)]
-struct PointsArguments {
-    first: u64,
-    nodes: u64,
-    weights: u64,
-    blocks: u64,
-    tangents: u64,
-    on_free: u64,
-    of_motion: u64,
-    motion: u64,
-    motions: u64,
-    obstacles: i64,
-    u: u64,
-    forces: u64,
-    n: i64,
-    dimension: i32,
-}
-
 /// `PointSums` of `kernels/data.h`.
 #[derive(Clone, Copy, Default)]
 #[repr(C)]
@@ -78,14 +58,13 @@ pub(super) struct PointSums {
 }
 
 impl PointArrays {
-    /// For each of `nodal` nodes the first of its points, and the points with weights, in the order of the points.
-    fn by_node(&self, nodal: usize) -> ([Vec<u32>; 2], Vec<f64>) {
-        let [first, entries] = by_node(&self.nodes, nodal);
+    /// For each of `nodal` nodes its points, in their order, and the weights of all these points.
+    fn by_node(&self, nodal: usize) -> (Lists<u32>, Vec<f64>) {
+        let entries = Lists::of_places(&self.nodes, nodal);
         let bounds = self.first.windows(2).zip(0..);
         let points: Vec<u32> = bounds.flat_map(|(bounds, point)| (bounds[0]..bounds[1]).map(move |_| point)).collect();
-        let of = |entry: &u32| (points[*entry as usize], self.weights[*entry as usize]);
-        let (points, weights) = entries.iter().map(of).unzip();
-        ([first, points], weights)
+        let weights = entries.arrays()[1].iter().map(|&entry| self.weights[entry as usize]).collect();
+        (entries.map(|entry| points[entry as usize]), weights)
     }
 }
 
@@ -108,7 +87,7 @@ impl Points {
             numbers: [weights, blocks, tangents, of_motion, motion].map(|list| gpu.copy_of(list)),
             motions: gpu.memory_for(obstacles * MOTION),
             forces: gpu.memory_for(count * dimension),
-            by_node: by_node.map(|list| gpu.copy_of(&list)),
+            by_node: by_node.arrays().map(|list| gpu.copy_of(list)),
             weights_by_node: gpu.copy_of(&weights_by_node),
         })
     }
@@ -118,7 +97,8 @@ impl Points {
         let n = self.first.len() - 1;
         let address = |of: &Buffer<f64>| if of.len() == 0 { 0 } else { of.address() };
         let [weights, blocks, tangents, of_motion, motion] = self.numbers.each_ref().map(address);
-        let arguments = PointsArguments {
+        // `Points` of `kernels/points.h`.
+        let arguments = arguments! {
             first: self.first.address(),
             nodes: self.nodes.address(),
             weights,

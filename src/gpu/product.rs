@@ -1,12 +1,13 @@
 //! The product of a linearised step with a nodal field, on a device (`kernels/data.h` and `kernels/transfer.h`).
 
-use super::device::{Buffer, GpuError};
+use super::device::{Buffer, GpuError, arguments};
 use super::followers::{Followers, clear_fixed};
 use super::points::{PointSums, Points};
 use super::rows::{Rows, RowsArguments};
-use super::transfer::{Transfer, TransferArguments};
+use super::transfer::Transfer;
 use super::vectors::GpuVector;
-use std::sync::{Arc, Mutex, PoisonError};
+use crate::parallel::held;
+use std::sync::{Arc, Mutex};
 
 /// Most sets of rows of a product.
 pub(crate) const SETS: usize = 4;
@@ -26,40 +27,6 @@ pub(crate) struct Inertia {
     pub factor: f64,
     /// ε
     pub lumping: f64,
-}
-
-/// `Product` of `kernels/data.h`.
-#[derive(Clone, Copy)]
-#[repr(C)]
-struct ProductArguments {
-    transfer: TransferArguments,
-    u: u64,
-    boxes: u64,
-    mass: u64,
-    mass_factor: f64,
-    consistent: f64,
-    sets: i32,
-    together: i32,
-    window_rows: i32,
-    window_nodes: i32,
-    rows: [RowsArguments; SETS],
-}
-
-/// `Nodes` of `kernels/data.h`.
-#[derive(Clone, Copy)]
-#[repr(C)]
-struct NodesArguments {
-    entry_first: u64,
-    entries: u64,
-    boxes: u64,
-    lumped: u64,
-    lumped_factor: f64,
-    u: u64,
-    prescribed: u64,
-    points: [PointSums; 2],
-    y: u64,
-    n: i64,
-    dimension: i32,
 }
 
 /// A linearised step on a device.
@@ -89,7 +56,7 @@ impl Product {
             }));
         }
         let Some(followers) = &self.followers else { return self.apply_to_all(x, self.prescribed.address(), y) };
-        let mut extended = self.extended.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut extended = held(&self.extended);
         gpu.copy(&x.0, &mut extended.0);
         followers.extend(gpu, &mut extended);
         self.apply_to_all(&extended, 0, y);
@@ -107,7 +74,8 @@ impl Product {
             for (to, from) in rows.iter_mut().zip(&self.rows) {
                 *to = from.arguments(transfer, u);
             }
-            let arguments = ProductArguments {
+            // `Product` of `kernels/data.h`.
+            let arguments = arguments! {
                 transfer: transfer.arguments(),
                 u: u.address(),
                 boxes: transfer.boxes.address(),
@@ -126,7 +94,8 @@ impl Product {
         let [entry_first, entries] = [9, 10].map(|k| transfer.arrays[k].address());
         let n = transfer.nodal * transfer.dimension;
         let none = PointSums::default();
-        let arguments = NodesArguments {
+        // `Nodes` of `kernels/data.h`.
+        let arguments = arguments! {
             entry_first,
             entries,
             boxes: if passes { transfer.boxes.address() } else { 0 },

@@ -1,7 +1,7 @@
 //! The tangents of the laws and of averaged cells on a device (`Rows` of `kernels/data.h`).
 
-use super::device::Buffer;
-use super::transfer::{Transfer, TransferArguments};
+use super::device::{Buffer, arguments};
+use super::transfer::Transfer;
 use super::vectors::GpuVector;
 use std::sync::Arc;
 
@@ -34,37 +34,14 @@ pub(crate) struct Cells {
     pub changes: Buffer<f64>,
 }
 
-/// `Volumes` of `kernels/data.h`.
-#[derive(Clone, Copy)]
-#[repr(C)]
-struct VolumesArguments {
-    transfer: TransferArguments,
-    u: u64,
-    rows: u64,
-    volumes: u64,
-    count: i32,
-    first_of_b: i32,
-}
-
-/// `Cells` of `kernels/points.h`.
-#[derive(Clone, Copy)]
-#[repr(C)]
-struct CellsArguments {
-    first: u64,
-    members: u64,
-    stiffness: u64,
-    volumes: u64,
-    changes: u64,
-    n: i64,
-}
-
 impl Rows {
     /// Computes the changes of pressure of averaged cells by a nodal field, and returns the arguments of these rows.
     pub(super) fn arguments(&self, transfer: &Transfer, u: &GpuVector) -> RowsArguments {
         let (rows, form, count) = (self.rows.address(), self.form, self.count as i32);
         let alone = RowsArguments { rows, factor: self.factor, form, count, ..RowsArguments::default() };
         let Some(cells) = &self.cells else { return alone };
-        let volumes = VolumesArguments {
+        // `Volumes` of `kernels/data.h`.
+        let volumes = arguments! {
             transfer: transfer.arguments(),
             u: u.address(),
             rows,
@@ -76,7 +53,8 @@ impl Rows {
         transfer.gpu().launch(kernel, transfer.blocks, transfer.shared, &volumes);
         let [first, members] = cells.members.each_ref().map(Buffer::address);
         let n = cells.stiffness.len();
-        let sums = CellsArguments {
+        // `Cells` of `kernels/points.h`.
+        let sums = arguments! {
             first,
             members,
             stiffness: cells.stiffness.address(),

@@ -2,6 +2,7 @@
 
 use super::device::{Buffer, Gpu, THREADS};
 use crate::lanes::LANES;
+use crate::lists::Lists;
 use std::sync::Arc;
 
 /// Weights that are copied at a time.
@@ -35,13 +36,12 @@ pub(crate) struct TransferArrays {
 }
 
 impl TransferArrays {
-    /// For each node, the start of its entries, and the entries: the places of all boxes that belong to it, in the order of the blocks.
-    fn entries(&self) -> [Vec<u32>; 2] {
+    /// For each node, the places of all boxes that belong to it, in the order of the blocks.
+    fn entries(&self) -> Lists<u32> {
         let bounds = self.node_first.windows(2).zip(&self.box_first);
         let own = bounds.map(|(bounds, first)| (&self.places[bounds[0] as usize..bounds[1] as usize], first));
         let places: Vec<u32> = own.flat_map(|(own, first)| own.iter().map(move |place| first + place)).collect();
-        let [first, order] = by_node(&self.nodes, self.nodal);
-        [first, order.into_iter().map(|entry| places[entry as usize]).collect()]
+        Lists::of_places(&self.nodes, self.nodal).map(|entry| places[entry as usize])
     }
 
     /// Bytes on a device, with the entries of the nodes and the boxes, without the weights.
@@ -71,20 +71,6 @@ impl TransferArrays {
         }
         largest
     }
-}
-
-/// For each of `nodal` nodes the start of its entries, and the entries: the indices in `nodes` at which the node stands, ascending.
-pub(super) fn by_node(nodes: &[u32], nodal: usize) -> [Vec<u32>; 2] {
-    let mut first = vec![0; nodal + 1];
-    nodes.iter().for_each(|&node| first[node as usize + 1] += 1);
-    (0..nodal).for_each(|node| first[node + 1] += first[node]);
-    let (mut next, mut entries) = (first.clone(), vec![0; nodes.len()]);
-    for (&node, entry) in nodes.iter().zip(0..) {
-        let next = &mut next[node as usize];
-        entries[*next as usize] = entry;
-        *next += 1;
-    }
-    [first, entries]
 }
 
 /// The most rows along x and nodes of a window.
@@ -145,7 +131,8 @@ impl Transfer {
         }
         gpu.write_at(&part, &mut on_device, at);
         let places = arrays.box_first.last().copied().unwrap_or(0) as usize;
-        let [entry_first, entries] = arrays.entries();
+        let of_nodes = arrays.entries();
+        let [entry_first, entries] = of_nodes.arrays();
         let a = arrays;
         let lists = [
             &a.group_first,
@@ -157,8 +144,8 @@ impl Transfer {
             &a.window_shape,
             &a.nodes,
             &a.places,
-            &entry_first,
-            &entries,
+            entry_first,
+            entries,
         ];
         Self {
             dimension: a.dimension,

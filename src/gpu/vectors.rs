@@ -1,6 +1,6 @@
 //! Vectors on a device, and their operations (`kernels/vectors.h`).
 
-use super::device::{Buffer, Gpu, SHARED_SUM};
+use super::device::{Buffer, Gpu, SHARED_SUM, arguments};
 use crate::space::vector::{self, Along, CHUNK, Vectors};
 
 /// A vector of numbers on a device.
@@ -27,63 +27,6 @@ impl GpuVector {
     }
 }
 
-/// `Update` of `kernels/vectors.h`.
-#[derive(Clone, Copy)]
-#[repr(C)]
-struct Update {
-    x: u64,
-    y: u64,
-    a: f64,
-    b: f64,
-    n: i64,
-}
-
-/// `Dot` of `kernels/vectors.h`.
-#[derive(Clone, Copy)]
-#[repr(C)]
-struct Dot {
-    x: u64,
-    y: u64,
-    partial: u64,
-    n: i64,
-}
-
-/// `Advance` of `kernels/vectors.h`.
-#[derive(Clone, Copy)]
-#[repr(C)]
-struct Advance {
-    p: u64,
-    q: u64,
-    x: u64,
-    next: u64,
-    r: u64,
-    partial: u64,
-    a: f64,
-    n: i64,
-}
-
-/// `Move` of `kernels/vectors.h`.
-#[derive(Clone, Copy)]
-#[repr(C)]
-struct Move {
-    p: u64,
-    q: u64,
-    x: u64,
-    r: u64,
-    n: i64,
-}
-
-/// `Blocks` of `kernels/vectors.h`.
-#[derive(Clone, Copy)]
-#[repr(C)]
-struct Blocks {
-    blocks: u64,
-    r: u64,
-    z: u64,
-    n: i64,
-    dimension: i32,
-}
-
 impl Gpu {
     /// z = M r for a matrix M of diagonal blocks with `dimension` rows, stored column by column. Where there are no blocks, z = r.
     pub(crate) fn multiply_blocks(&self, blocks: &Buffer<f64>, dimension: usize, r: &GpuVector, z: &mut GpuVector) {
@@ -92,13 +35,13 @@ impl Gpu {
             Vectors::copy(self, r, z);
         }
         let (r, z) = (r.address(), z.address());
-        let arguments = Blocks { blocks: blocks.address(), r, z, n: n as i64, dimension: dimension as i32 };
+        let arguments = arguments! { blocks: blocks.address(), r, z, n: n as i64, dimension: dimension as i32 };
         self.launch_for("multiply_blocks", n, &arguments);
     }
 
     fn update(&self, kernel: &'static str, [a, b]: [f64; 2], x: &GpuVector, y: &GpuVector) {
         let n = x.0.len().min(y.0.len());
-        self.launch_for(kernel, n, &Update { x: x.address(), y: y.address(), a, b, n: n as i64 });
+        self.launch_for(kernel, n, &arguments! { x: x.address(), y: y.address(), a, b, n: n as i64 });
     }
 }
 
@@ -126,7 +69,7 @@ impl Vectors for Gpu {
         let n = x.0.len().min(y.0.len());
         let count = n.div_ceil(CHUNK);
         self.sum(count, |partial| {
-            let arguments = Dot { x: x.address(), y: y.address(), partial, n: n as i64 };
+            let arguments = arguments! { x: x.address(), y: y.address(), partial, n: n as i64 };
             self.launch("dot", count, SHARED_SUM, &arguments);
         })
     }
@@ -162,7 +105,7 @@ impl Vectors for Gpu {
     fn move_along(&self, p: &GpuVector, q: &GpuVector, x: &mut GpuVector, r: &mut GpuVector) {
         let n = p.0.len().min(q.0.len()).min(x.0.len()).min(r.0.len());
         let [p, q, x, r] = [p, q, &*x, &*r].map(GpuVector::address);
-        self.launch_for("move_along", n, &Move { p, q, x, r, n: n as i64 });
+        self.launch_for("move_along", n, &arguments! { p, q, x, r, n: n as i64 });
     }
 
     fn advance(
@@ -172,7 +115,7 @@ impl Vectors for Gpu {
         let count = n.div_ceil(CHUNK);
         self.sum(count, |partial| {
             let [p, q, x, next, r] = [p, q, x, &*next, &*r].map(GpuVector::address);
-            let arguments = Advance { p, q, x, next, r, partial, a: α, n: n as i64 };
+            let arguments = arguments! { p, q, x, next, r, partial, a: α, n: n as i64 };
             self.launch("advance", count, SHARED_SUM, &arguments);
         })
     }

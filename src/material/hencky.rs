@@ -7,15 +7,14 @@
 use super::spectral::{Function, Hencky, artanh_over, function, principal_axes};
 use super::{Lame, TangentBlocks};
 use crate::scalar::Real;
-use crate::tensor::{Deformation, Tensor, Vector, contract, cut, embed, identity, outer, scaled, symmetric, trace};
-
-/// Rows and columns of the six numbers of a symmetric tensor.
-const SIX: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)];
+use crate::tensor::{
+    Deformation, SYMMETRIC, Tensor, Vector, contract, cut, embed, identity, outer, scaled, symmetric, trace,
+};
 
 /// A symmetric tensor from six numbers. Missing numbers are zero.
 fn six(numbers: &[f64]) -> Tensor<f64, 3> {
     let mut a = Tensor::zeros();
-    for (&(i, k), &x) in SIX.iter().zip(numbers) {
+    for (&(i, k), &x) in SYMMETRIC.iter().zip(numbers) {
         (a[(i, k)], a[(k, i)]) = (x, x);
     }
     a
@@ -153,7 +152,7 @@ impl Principal {
         let lost = Tensor::from_diagonal(&Vector::from_fn(|i, _| (1.0 + 2.0 * self.x[i]) * (-2.0 * flow[i]).exp_m1()));
         let back = self.at.inverse_transpose().transpose() * self.axes;
         let after = six(inverse_inelastic) + back * lost * back.transpose();
-        next.iter_mut().zip(SIX).for_each(|(next, (i, k))| *next = 0.5 * (after[(i, k)] + after[(k, i)]));
+        next.iter_mut().zip(SYMMETRIC).for_each(|(next, (i, k))| *next = 0.5 * (after[(i, k)] + after[(k, i)]));
     }
 }
 

@@ -153,21 +153,7 @@ pub struct LameParameters {
 
 impl LameParameters {
     /// Λ and G. `None` if a value below the key `path` is not allowed; `problems` then says why.
-    ///
-    /// ```
-    /// use bfree::material::{Lame, LameParameters};
-    /// use bfree::scene::Problems;
-    ///
-    /// // Two pairs give the same solid: E = 2.5, ν = ¼ is Λ = G = 1. One constant of each is not a pair.
-    /// let mut problems = Problems::default();
-    /// let mut lame = |text| serde_json::from_str::<LameParameters>(text).map(|given| given.lame(&mut problems, "material"));
-    /// assert_eq!(lame(r#"{"young": 2.5, "poisson": 0.25}"#)?, Lame::new(1.0, 1.0).ok());
-    /// assert_eq!(lame(r#"{"lambda": 1, "shear": 1}"#)?, Lame::new(1.0, 1.0).ok());
-    /// assert!(lame(r#"{"young": 2.5, "shear": 1}"#)?.is_none());
-    /// assert!(problems.to_string().contains("shear with young"), "{problems}");
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    pub fn lame(&self, problems: &mut Problems, path: &str) -> Option<Lame> {
+    pub(crate) fn lame(&self, problems: &mut Problems, path: &str) -> Option<Lame> {
         let Self { lambda, shear, young, poisson, bulk } = *self;
         let keys = [("lambda", lambda), ("shear", shear), ("young", young), ("poisson", poisson), ("bulk", bulk)];
         let given: Vec<(&str, f64)> = keys.into_iter().filter_map(|(key, value)| Some((key, value?))).collect();
@@ -212,5 +198,23 @@ impl LameParameters {
         };
         problems.refuse(&format!("{path}.{key}"), Number(value), allowed);
         None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_pairs_of_constants_give_the_same_solid() -> Result<(), Box<dyn std::error::Error>> {
+        // E = 2.5, ν = ¼ is Λ = G = 1. One constant of each is not a pair.
+        let mut problems = Problems::default();
+        let mut lame =
+            |text| serde_json::from_str::<LameParameters>(text).map(|given| given.lame(&mut problems, "material"));
+        assert_eq!(lame(r#"{"young": 2.5, "poisson": 0.25}"#)?, Lame::new(1.0, 1.0).ok());
+        assert_eq!(lame(r#"{"lambda": 1, "shear": 1}"#)?, Lame::new(1.0, 1.0).ok());
+        assert!(lame(r#"{"young": 2.5, "shear": 1}"#)?.is_none());
+        assert!(problems.to_string().contains("shear with young"), "{problems}");
+        Ok(())
     }
 }

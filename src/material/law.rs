@@ -275,16 +275,7 @@ pub fn internal_variable<L: Law, T: Real, const D: usize>(
 }
 
 /// The names of the internal variables of laws, each once.
-///
-/// ```
-/// use bfree::material::{Hardening, Lame, PLASTIC_STRAIN, Plastic, VonMises, internal_variable_names};
-///
-/// let criterion = VonMises { yield_stress: Hardening::perfect(0.1) };
-/// let law = Plastic { solid: Lame::new(1.0, 1.0)?, criterion };
-/// assert_eq!(internal_variable_names([&law, &law].into_iter())[0], PLASTIC_STRAIN);
-/// # Ok::<(), bfree::material::LameError>(())
-/// ```
-pub fn internal_variable_names<'a, L: Law + 'a>(laws: impl Iterator<Item = &'a L>) -> Vec<&'static str> {
+pub(crate) fn internal_variable_names<'a, L: Law + 'a>(laws: impl Iterator<Item = &'a L>) -> Vec<&'static str> {
     let mut names = Vec::new();
     for variable in laws.flat_map(|law| law.internal_variables()) {
         if !names.contains(&variable.name) {

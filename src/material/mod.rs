@@ -40,14 +40,13 @@ pub use from_energy::{Energy, FromEnergy};
 pub use hardening::Hardening;
 pub use hencky::Radial;
 pub use lame::{Lame, LameError, LameParameters};
-pub use law::{
-    DISSIPATED, InternalVariable, Law, PLASTIC_STRAIN, TangentBlocks, first_piola, internal_variable,
-    internal_variable_names,
-};
+pub(crate) use law::internal_variable_names;
+pub use law::{DISSIPATED, InternalVariable, Law, PLASTIC_STRAIN, TangentBlocks, first_piola, internal_variable};
 pub(crate) use list::LawVisitor;
 pub use list::{Material, Parameters};
 pub use listed::Listed;
-pub use moduli::{out_of_plane_stress, p_wave_modulus, poissons_ratio, stiffness_at_rest};
+pub use moduli::p_wave_modulus;
+pub(crate) use moduli::{out_of_plane_stress, poissons_ratio};
 pub use mooney_rivlin::MooneyRivlin;
 pub use neo_hookean::NeoHookean;
 pub use ogden::{Ogden, OgdenTerm};
@@ -56,5 +55,6 @@ pub(crate) use spectral::principal_values;
 pub use st_venant_kirchhoff::StVenantKirchhoff;
 pub use state::{MaterialState, NonPositiveJacobian};
 pub use viscoelastic::{Branch, Viscoelastic, ViscoelasticParameters};
-pub use volume::{Ciarlet, Logarithmic, VolumeResponse, Volumetric};
+pub(crate) use volume::Volumetric;
+pub use volume::{Ciarlet, Logarithmic, VolumeResponse};
 pub use von_mises::{VonMises, VonMisesParameters};

@@ -25,68 +25,52 @@
 #[macro_export]
 macro_rules! law_of_variants {
     (Self: $($variant:ident),+) => {
-        fn energy<T: $crate::scalar::Real, const D: usize>(&self, at: &$crate::material::MaterialState<T, D>) -> T {
-            match self { $(Self::$variant(law) => $crate::material::Law::energy(law, at)),+ }
+        $crate::law_of_variants! { @methods [$($variant),+]
+            fn energy[T: $crate::scalar::Real, const D: usize](at: &$crate::material::MaterialState<T, D>) -> T;
+            fn stress[T: $crate::scalar::Real, const D: usize](
+                at: &$crate::material::MaterialState<T, D>
+            ) -> $crate::tensor::Tensor<T, D>;
+            fn elasticity[const D: usize](
+                at: &$crate::material::MaterialState<f64, D>,
+                x: &$crate::tensor::Tensor<f64, D>
+            ) -> $crate::tensor::Tensor<f64, D>;
+            fn tangent_density[const D: usize](
+                at: &$crate::material::MaterialState<f64, D>,
+                v: &$crate::tensor::Vector<f64, D>,
+                b: &$crate::tensor::Vector<f64, D>
+            ) -> $crate::tensor::Tensor<f64, D>;
+            fn tangent_blocks[const D: usize](
+                f_r: &$crate::tensor::Tensor<f64, D>,
+                at: &$crate::material::MaterialState<f64, D>
+            ) -> $crate::material::TangentBlocks<D>;
+            fn closed[const D: usize](
+                f_r: &$crate::tensor::Tensor<f64, D>,
+                at: &$crate::material::MaterialState<f64, D>,
+                volume: f64
+            ) -> Option<$crate::material::ClosedTangent<f64, D>>;
+            fn volumetric[T: $crate::scalar::Real](
+                at: &$crate::tensor::Deformation<T, 1>
+            ) -> Option<$crate::material::VolumeResponse<T>>;
+            fn internal_variables[]() -> &[$crate::material::InternalVariable];
+            fn update_variables[const D: usize](
+                at: &$crate::material::MaterialState<f64, D>,
+                variables: &mut [f64]
+            ) -> ();
+            fn is_symmetric[]() -> bool;
+            fn has_potential[]() -> bool;
+            fn check_claim[const D: usize](at: &$crate::material::MaterialState<f64, D>) -> Result<(), String>;
+            fn last_failure[]() -> Option<String>;
         }
-        fn stress<T: $crate::scalar::Real, const D: usize>(
-            &self,
-            at: &$crate::material::MaterialState<T, D>,
-        ) -> $crate::tensor::Tensor<T, D> {
-            match self { $(Self::$variant(law) => $crate::material::Law::stress(law, at)),+ }
-        }
-        fn elasticity<const D: usize>(
-            &self,
-            at: &$crate::material::MaterialState<f64, D>,
-            x: &$crate::tensor::Tensor<f64, D>,
-        ) -> $crate::tensor::Tensor<f64, D> {
-            match self { $(Self::$variant(law) => $crate::material::Law::elasticity(law, at, x)),+ }
-        }
-        fn tangent_density<const D: usize>(
-            &self,
-            at: &$crate::material::MaterialState<f64, D>,
-            v: &$crate::tensor::Vector<f64, D>,
-            b: &$crate::tensor::Vector<f64, D>,
-        ) -> $crate::tensor::Tensor<f64, D> {
-            match self { $(Self::$variant(law) => $crate::material::Law::tangent_density(law, at, v, b)),+ }
-        }
-        fn tangent_blocks<const D: usize>(
-            &self,
-            f_r: &$crate::tensor::Tensor<f64, D>,
-            at: &$crate::material::MaterialState<f64, D>,
-        ) -> $crate::material::TangentBlocks<D> {
-            match self { $(Self::$variant(law) => $crate::material::Law::tangent_blocks(law, f_r, at)),+ }
-        }
-        fn closed<const D: usize>(
-            &self,
-            f_r: &$crate::tensor::Tensor<f64, D>,
-            at: &$crate::material::MaterialState<f64, D>,
-            volume: f64,
-        ) -> Option<$crate::material::ClosedTangent<f64, D>> {
-            match self { $(Self::$variant(law) => $crate::material::Law::closed(law, f_r, at, volume)),+ }
-        }
-        fn volumetric<T: $crate::scalar::Real>(
-            &self,
-            at: &$crate::tensor::Deformation<T, 1>,
-        ) -> Option<$crate::material::VolumeResponse<T>> {
-            match self { $(Self::$variant(law) => $crate::material::Law::volumetric(law, at)),+ }
-        }
-        fn internal_variables(&self) -> &[$crate::material::InternalVariable] {
-            match self { $(Self::$variant(law) => $crate::material::Law::internal_variables(law)),+ }
-        }
-        fn update_variables<const D: usize>(&self, at: &$crate::material::MaterialState<f64, D>, variables: &mut [f64]) {
-            match self { $(Self::$variant(law) => $crate::material::Law::update_variables(law, at, variables)),+ }
-        }
-        fn is_symmetric(&self) -> bool {
-            match self { $(Self::$variant(law) => $crate::material::Law::is_symmetric(law)),+ }
-        }
-        fn has_potential(&self) -> bool {
-            match self { $(Self::$variant(law) => $crate::material::Law::has_potential(law)),+ }
-        }
-        fn check_claim<const D: usize>(&self, at: &$crate::material::MaterialState<f64, D>) -> Result<(), String> {
-            match self { $(Self::$variant(law) => $crate::material::Law::check_claim(law, at)),+ }
-        }
-        fn last_failure(&self) -> Option<String> {
-            match self { $(Self::$variant(law) => $crate::material::Law::last_failure(law)),+ }
+    };
+    (@methods $variants:tt $(fn $method:ident[$($generics:tt)*]($($name:ident: $type:ty),*) -> $out:ty;)+) => {
+        // A name of one expansion is unknown in another one, so `law` is handed over.
+        $($crate::law_of_variants! {
+            @method $variants law fn $method[$($generics)*]($($name: $type),*) -> $out { (law, $($name),*) }
+        })+
+    };
+    (@method [$($variant:ident),+] $law:ident fn $method:ident[$($generics:tt)*]($($parameters:tt)*) -> $out:ty { $call:tt }) => {
+        fn $method<$($generics)*>(&self, $($parameters)*) -> $out {
+            match self { $(Self::$variant($law) => $crate::material::Law::$method $call),+ }
         }
     };
 }

@@ -15,7 +15,7 @@ pub struct VolumeResponse<T> {
 }
 
 /// The volumetric energy U(J) of a solid, for a given Λ. It is a type, so that a loop over particles does not branch on it.
-pub trait Volumetric: Copy + Default + Send + Sync + 'static {
+pub(crate) trait Volumetric: Copy + Default + Send + Sync + 'static {
     /// U for Λ = `lambda`.
     fn energy<T: Real, const D: usize>(lambda: f64, at: &Deformation<T, D>) -> T;
 

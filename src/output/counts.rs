@@ -9,7 +9,6 @@ use serde::{Deserialize, Serialize};
 ///
 /// ```
 /// use bfree::output::report::Counts;
-/// use bfree::simulation::FailedAttempt;
 ///
 /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
 /// let mut simulation = scene.build::<2>("scenes".as_ref())?;
@@ -17,15 +16,6 @@ use serde::{Deserialize, Serialize};
 /// counts.add(&step);
 /// counts.add(&simulation.advance()?);
 /// assert_eq!((counts.steps, counts.max_active_nodes), (2, step.active_nodes));
-/// // A failed attempt is counted, too.
-/// let newton = step.newton.history.clone();
-/// let before = counts.residual_evaluations;
-/// let why = "no equilibrium was found".into();
-/// let seconds = bfree::phases::Stopwatch::start();
-/// counts.add_failed(&[FailedAttempt { dt: 0.05, inaccurate: false, why, projection_iterations: 7, newton, seconds }]);
-/// assert_eq!((counts.steps, counts.failed_attempts), (2, 1));
-/// assert_eq!(counts.residual_evaluations, before + step.newton.history.counts.residuals as u64);
-/// assert_eq!(counts.projection_iterations, 7); // none by the steps, whose mass is lumped
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -83,7 +73,7 @@ impl Counts {
     }
 
     /// Adds attempts that failed.
-    pub fn add_failed(&mut self, attempts: &[FailedAttempt]) {
+    pub(crate) fn add_failed(&mut self, attempts: &[FailedAttempt]) {
         self.failed_attempts += attempts.len() as u64;
         for attempt in attempts {
             self.projection_iterations += attempt.projection_iterations as u64;
@@ -157,5 +147,30 @@ impl Seconds {
         std::iter::once(("set_up", self.set_up))
             .chain(phases)
             .chain([("output", self.output), ("other", other.max(0.0))])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failed_attempt_is_counted() -> Result<(), Box<dyn std::error::Error>> {
+        let mut simulation =
+            crate::scene::read_file("scenes/rebound.json".as_ref(), &[])?.build::<2>("scenes".as_ref())?;
+        let (newton, why) = (simulation.advance()?.newton.history, "no equilibrium was found".into());
+        let (residuals, seconds) = (newton.counts.residuals as u64, Stopwatch::start());
+        let mut counts = Counts::default();
+        counts.add_failed(&[FailedAttempt {
+            dt: 0.05,
+            inaccurate: false,
+            why,
+            projection_iterations: 7,
+            newton,
+            seconds,
+        }]);
+        assert_eq!((counts.steps, counts.failed_attempts, counts.projection_iterations), (0, 1, 7));
+        assert_eq!(counts.residual_evaluations, residuals);
+        Ok(())
     }
 }

@@ -7,10 +7,7 @@ use crate::material::{
     internal_variable_names, out_of_plane_stress, principal_values,
 };
 use crate::simulation::Simulation;
-use crate::tensor::{Tensor, Vector, embed, identity};
-
-/// Rows and columns of the components of [`Kind::Symmetric`].
-const SYMMETRIC: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)];
+use crate::tensor::{SYMMETRIC, Tensor, Vector, embed, identity};
 
 impl Field {
     /// Appends the components at the particle `id` to `out`.

@@ -191,11 +191,11 @@ impl Shape {
             }
             Self::Union(parts) => {
                 let allowed = has_few(parts, problems, &at("union"));
-                shape::Union(self.checked_parts(problems, path).filter(|_| allowed)?).into()
+                shape::Shape::union(self.checked_parts(problems, path).filter(|_| allowed)?)
             }
             Self::Intersection(parts) => {
                 let allowed = has_few(parts, problems, &at("intersection"));
-                shape::Intersection(self.checked_parts(problems, path).filter(|_| allowed)?).into()
+                shape::Shape::intersection(self.checked_parts(problems, path).filter(|_| allowed)?)
             }
             Self::Difference { .. } => {
                 let [of, minus] = self.checked_parts(problems, path)?.try_into().ok()?;

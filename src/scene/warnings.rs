@@ -7,7 +7,7 @@ use super::{BodyUse, Scene};
 use crate::grid::{Grid, indices};
 use crate::material::{Law, Material, poissons_ratio};
 use crate::mechanics::loads::{Obstacle, SurfaceLoad};
-use crate::shape::{EDGE, Fill, GridBox, Intersection, Shape, around};
+use crate::shape::{EDGE, Fill, GridBox, Shape, around};
 use crate::simulation::Simulation;
 use crate::tensor::{Deformation, Tensor, Vector};
 use std::collections::BTreeSet;
@@ -146,12 +146,10 @@ fn narrow<const D: usize>(path: &str, shape: &Shape<D>, spacing: f64) -> Option<
 
 /// Warns of two parts of a union, or of two obstacles at rest, that touch along a face.
 fn seam<const D: usize>(obstacles: &[Obstacle<D>], spacing: f64) -> Option<String> {
-    let parts = |(number, obstacle): (usize, &'_ Obstacle<D>)| {
-        let parts =
-            if let Shape::Union(union) = &obstacle.shape { union.0.clone() } else { vec![obstacle.shape.clone()] };
-        parts.into_iter().map(|part| (number, part)).collect::<Vec<_>>()
-    };
-    let parts: Vec<_> = obstacles.iter().enumerate().flat_map(parts).collect();
+    let mut parts = Vec::new();
+    for (number, obstacle) in obstacles.iter().enumerate() {
+        parts.extend(obstacle.shape.united().iter().map(|part| (number, part)));
+    }
     for (i, (one, of_one)) in parts.iter().enumerate() {
         for (other, of_other) in &parts[i + 1..] {
             let rest = [one, other].iter().all(|&&number| !obstacles[number].moves());
@@ -212,7 +210,7 @@ impl<const D: usize> Bodies<'_, D> {
         let cells: BTreeSet<_> = found.iter().filter_map(|&p| grid.cell(&particles.position[p])).collect();
         let volume: f64 = match (&self.shapes[a], &self.shapes[b]) {
             (Some(one), Some(other)) => {
-                let common = Shape::from(Intersection(vec![one.clone(), other.clone()]));
+                let common = Shape::intersection(vec![one.clone(), other.clone()]);
                 cells.iter().map(|&cell| common.part(&GridBox::cell(grid, cell)).0).sum()
             }
             _ => found.iter().map(|&p| particles.volume[p]).sum(),

@@ -4,7 +4,7 @@ use crate::tensor::Vector;
 
 /// An axis-parallel box, by its lower and its upper corner.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Bounds<const D: usize>(pub Vector<f64, D>, pub Vector<f64, D>);
+pub(crate) struct Bounds<const D: usize>(pub Vector<f64, D>, pub Vector<f64, D>);
 
 impl<const D: usize> Bounds<D> {
     /// The bounds of some points.

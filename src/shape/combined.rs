@@ -3,13 +3,13 @@
 use super::{Face, Feature, Shape, Solid, axis};
 use crate::tensor::Vector;
 
-/// The union of the parts.
+/// The union of the parts, or their intersection.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Union<const D: usize>(pub Vec<Shape<D>>);
-
-/// The intersection of the parts.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Intersection<const D: usize>(pub Vec<Shape<D>>);
+pub struct Combination<const D: usize> {
+    /// 1 for the union, −1 for the intersection: the part with the smallest `sign` · d counts.
+    sign: f64,
+    parts: Vec<Shape<D>>,
+}
 
 /// The points that lie in `of` and not in `minus`.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,64 +20,53 @@ pub struct Difference<const D: usize> {
     pub minus: Box<Shape<D>>,
 }
 
-/// The only part with `sign` · d < `radius` at `x`; `None` if several parts or none are so near.
-fn only<'a, const D: usize>(parts: &'a [Shape<D>], x: &Vector<f64, D>, radius: f64, sign: f64) -> Option<&'a Shape<D>> {
-    let mut near = parts.iter().filter(|part| sign * part.signed_distance(x) < radius);
-    near.next().filter(|_| near.next().is_none())
+impl<const D: usize> Shape<D> {
+    /// The union of the parts.
+    pub fn union(parts: Vec<Self>) -> Self {
+        Combination { sign: 1.0, parts }.into()
+    }
+
+    /// The intersection of the parts.
+    pub fn intersection(parts: Vec<Self>) -> Self {
+        Combination { sign: -1.0, parts }.into()
+    }
+
+    /// The parts of a union; of another solid, the solid itself.
+    pub(crate) fn united(&self) -> &[Self] {
+        match self {
+            Self::Combination(union) if union.sign > 0.0 => &union.parts,
+            _ => std::slice::from_ref(self),
+        }
+    }
 }
 
-/// The part with the smallest `sign` · d at `x`, the first of several; `None` without parts.
-fn first_part<'a, const D: usize>(parts: &'a [Shape<D>], x: &Vector<f64, D>, sign: f64) -> Option<&'a Shape<D>> {
-    let distance = |part: &Shape<D>| sign * part.signed_distance(x);
-    parts.iter().reduce(|a, b| if distance(b) < distance(a) { b } else { a })
-}
-
-impl<const D: usize> Solid<D> for Union<D> {
-    /// d = min dᵢ
+impl<const D: usize> Solid<D> for Combination<D> {
+    /// d = min dᵢ or d = max dᵢ
     fn nearest(&self, x: &Vector<f64, D>) -> Face<D> {
-        let nowhere = (f64::INFINITY, axis(0, 1.0));
-        self.0.iter().map(|part| part.solid().nearest(x)).fold(nowhere, |a, b| if b.0 < a.0 { b } else { a })
+        let (sign, none) = (self.sign, (self.sign * f64::INFINITY, axis(0, 1.0)));
+        let faces = self.parts.iter().map(|part| part.solid().nearest(x));
+        faces.fold(none, |a, b| if sign * b.0 < sign * a.0 { b } else { a })
     }
 
     fn feature(&self, x: &Vector<f64, D>) -> Feature<D> {
-        first_part(&self.0, x, 1.0).map_or_else(|| Feature::plane(x, self.nearest(x)), |part| part.feature(x))
+        let distance = |part: &Shape<D>| self.sign * part.signed_distance(x);
+        let first = self.parts.iter().reduce(|a, b| if distance(b) < distance(a) { b } else { a });
+        first.map_or_else(|| Feature::plane(x, self.nearest(x)), |part| part.feature(x))
     }
 
     fn add_planes(&self, x: &Vector<f64, D>, radius: f64, planes: &mut Vec<Face<D>>) -> f64 {
-        self.0.iter().map(|part| part.solid().add_planes(x, radius, planes)).fold(0.0, f64::max)
+        self.parts.iter().map(|part| part.solid().add_planes(x, radius, planes)).fold(0.0, f64::max)
     }
 
+    /// For an intersection, an upper bound.
     fn reach(&self, n: &Vector<f64, D>) -> f64 {
-        self.0.iter().map(|part| part.solid().reach(n)).fold(f64::NEG_INFINITY, f64::max)
+        let farther = if self.sign > 0.0 { f64::max } else { f64::min };
+        self.parts.iter().map(|part| part.solid().reach(n)).fold(-self.sign * f64::INFINITY, farther)
     }
 
     fn alone(&self, x: &Vector<f64, D>, radius: f64) -> Option<(&Shape<D>, bool)> {
-        Some((only(&self.0, x, radius, 1.0)?, false))
-    }
-}
-
-impl<const D: usize> Solid<D> for Intersection<D> {
-    /// d = max dᵢ
-    fn nearest(&self, x: &Vector<f64, D>) -> Face<D> {
-        let everywhere = (f64::NEG_INFINITY, axis(0, 1.0));
-        self.0.iter().map(|part| part.solid().nearest(x)).fold(everywhere, |a, b| if b.0 > a.0 { b } else { a })
-    }
-
-    fn feature(&self, x: &Vector<f64, D>) -> Feature<D> {
-        first_part(&self.0, x, -1.0).map_or_else(|| Feature::plane(x, self.nearest(x)), |part| part.feature(x))
-    }
-
-    fn add_planes(&self, x: &Vector<f64, D>, radius: f64, planes: &mut Vec<Face<D>>) -> f64 {
-        self.0.iter().map(|part| part.solid().add_planes(x, radius, planes)).fold(0.0, f64::max)
-    }
-
-    /// An upper bound.
-    fn reach(&self, n: &Vector<f64, D>) -> f64 {
-        self.0.iter().map(|part| part.solid().reach(n)).fold(f64::INFINITY, f64::min)
-    }
-
-    fn alone(&self, x: &Vector<f64, D>, radius: f64) -> Option<(&Shape<D>, bool)> {
-        Some((only(&self.0, x, radius, -1.0)?, false))
+        let mut near = self.parts.iter().filter(|part| self.sign * part.signed_distance(x) < radius);
+        near.next().filter(|_| near.next().is_none()).map(|part| (part, false))
     }
 }
 

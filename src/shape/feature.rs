@@ -7,7 +7,7 @@ use crate::tensor::{Tensor, Vector, identity, outer};
 /// A plane, a sphere or a surface of revolution that has the same signed distance as a solid around a point. Edges and corners are
 /// circles and spheres of radius 0.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Feature<const D: usize> {
+pub(crate) enum Feature<const D: usize> {
     /// A plane.
     Plane {
         /// A point of the plane.
@@ -36,7 +36,7 @@ pub enum Feature<const D: usize> {
 }
 
 /// The signed distance of a point and its first derivative.
-pub struct Distance<T, const D: usize> {
+pub(crate) struct Distance<T, const D: usize> {
     /// The signed distance d, negative inside.
     pub distance: T,
     /// ∇d, the outward unit normal.
@@ -61,16 +61,7 @@ impl<const D: usize> Feature<D> {
     }
 
     /// d and ∇d at `x`.
-    ///
-    /// ```
-    /// use bfree::shape::Feature;
-    /// use bfree::tensor::Vector;
-    ///
-    /// let disc = Feature::Sphere { center: Vector::from([1.0, 0.0]), radius: 5.0, sign: 1.0 };
-    /// let at = disc.at(&Vector::from([7.0, 8.0]));
-    /// assert!(at.distance == 5.0 && (at.normal - Vector::from([0.6, 0.8])).norm() < 1e-15);
-    /// ```
-    pub fn at<T: Real>(&self, x: &Vector<T, D>) -> Distance<T, D> {
+    pub(crate) fn at<T: Real>(&self, x: &Vector<T, D>) -> Distance<T, D> {
         match self {
             Self::Plane { point, normal } => {
                 let normal = normal.map(T::lit);
@@ -90,19 +81,7 @@ impl<const D: usize> Feature<D> {
     }
 
     /// ∇²d at `x`, the curvature of the surfaces of equal distance.
-    ///
-    /// ```
-    /// use bfree::shape::Feature;
-    /// use bfree::tensor::{Tensor, Vector};
-    ///
-    /// // A cylinder about x: at a distance of 2 from the axis, circles of curvature 1/2 about the axis.
-    /// let side = Feature::Plane { point: Vector::from([0.0, 1.0]), normal: Vector::from([0.0, 1.0]) };
-    /// let axis = Vector::from([1.0, 0.0, 0.0]);
-    /// let cylinder = Feature::Revolved { end: Vector::zeros(), along: axis, profile: Box::new(side) };
-    /// let curvature = cylinder.curvature(&Vector::from([5.0, 0.0, 2.0]));
-    /// assert_eq!(curvature, Tensor::from_diagonal(&Vector::from([0.0, 0.5, 0.0])));
-    /// ```
-    pub fn curvature(&self, x: &Vector<f64, D>) -> Tensor<f64, D> {
+    pub(crate) fn curvature(&self, x: &Vector<f64, D>) -> Tensor<f64, D> {
         match self {
             Self::Plane { .. } => Tensor::zeros(),
             // ∇²|x − c| = (1 − m ⊗ m)/|x − c|
@@ -179,7 +158,7 @@ fn in_profile<T: Real, const D: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shape::{Ball, Block, Cone, Difference, HalfSpace, Polygon, Shape, Similar, Surface, Union, rotation};
+    use crate::shape::{Ball, Block, Cone, Difference, HalfSpace, Polygon, Shape, Similar, Surface, rotation};
     use num_dual::Dual64;
 
     /// The distance and the normal of the feature are those of the shape, and the curvature is the derivative of the normal.
@@ -216,7 +195,7 @@ mod tests {
         check(&ball.clone().into(), &points);
         check(&Difference { of: Box::new(block.clone().into()), minus: Box::new(ball.clone().into()) }.into(), &points);
         check(
-            &Union(vec![block.into(), Ball { center: Vector::from([2.5, 1.5]), radius: 0.3 }.into()]).into(),
+            &Shape::union(vec![block.into(), Ball { center: Vector::from([2.5, 1.5]), radius: 0.3 }.into()]),
             &points,
         );
         check(&Polygon::new(corners.to_vec())?.into(), &points);

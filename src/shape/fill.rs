@@ -10,7 +10,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The largest number of particle positions that [`fill`] examines for one body.
-pub const MAX_CANDIDATES: f64 = 134_217_728.0; // 2²⁷
+pub(crate) const MAX_CANDIDATES: f64 = 134_217_728.0; // 2²⁷
 
 /// The treatment of particles in the cells at the surface of a body.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
@@ -85,7 +85,7 @@ const VOLUME_ROUND_OFF: f64 = 1e-9;
 /// A shape that cannot be filled.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum FillError {
-    /// The box around the shape holds more particle positions than [`MAX_CANDIDATES`].
+    /// The box around the shape holds more than 2²⁷ particle positions.
     #[error(
         "the box around the shape holds {candidates:e} particle positions; at most {MAX_CANDIDATES:e} are allowed: \
          use a coarser grid or fewer particles per cell"
@@ -129,7 +129,7 @@ pub enum FillError {
 /// ```
 ///
 /// # Errors
-/// The shape needs more than [`MAX_CANDIDATES`] positions (found before anything is allocated), or no particle lies in the shape.
+/// The shape needs more than 2²⁷ positions (found before anything is allocated), or no particle lies in the shape.
 pub fn fill<const D: usize>(grid: &Grid<D>, shape: &Shape<D>, how: Filling) -> Result<Vec<Seed<D>>, FillError> {
     let (first, count) = around(grid, shape);
     let candidates = count.iter().map(|&n| n as f64 * f64::from(how.per_axis)).product::<f64>();

@@ -27,12 +27,12 @@ mod tests;
 pub use ball::Ball;
 pub use block::Block;
 pub(crate) use cloud::{Cloud, CloudPoint, NoSurface, cloud_surface};
-pub use combined::{Difference, Intersection, Union};
+pub use combined::{Combination, Difference};
 pub use cone::Cone;
 pub use cut::Facet;
-pub use feature::{Distance, Feature};
+pub(crate) use feature::Feature;
 pub(crate) use fill::around;
-pub use fill::{Fill, FillError, Filling, MAX_CANDIDATES, fill};
+pub use fill::{Fill, FillError, Filling, fill};
 pub use grid_box::GridBox;
 pub use half_space::HalfSpace;
 pub use layout::Layout;
@@ -128,12 +128,10 @@ shapes! {
     Polygon;
     /// A cylinder or a cone.
     Cone;
-    /// The union of the parts.
-    Union;
+    /// The union of the parts, or their intersection.
+    Combination;
     /// The points that lie in one solid and not in another.
     Difference;
-    /// The intersection of the parts.
-    Intersection;
     /// A solid turned and scaled.
     Similar;
     /// The inside of a closed surface of triangles.
@@ -146,34 +144,13 @@ shapes! {
 
 impl<const D: usize> Shape<D> {
     /// Whether `x` lies in the solid, its surface included.
-    ///
-    /// ```
-    /// use bfree::shape::{Ball, Difference, Shape};
-    /// use bfree::tensor::Vector;
-    ///
-    /// // A ring: its inner circle is part of its surface, its centre is not part of it.
-    /// let disc = |radius| Box::new(Ball { center: Vector::from([0.0, 0.0]), radius }.into());
-    /// let ring = Shape::from(Difference { of: disc(2.0), minus: disc(1.0) });
-    /// assert!(ring.contains(&Vector::from([1.5, 0.0])) && ring.contains(&Vector::from([0.0, 1.0])));
-    /// assert!(!ring.contains(&Vector::from([0.0, 0.0])));
-    /// ```
-    pub fn contains(&self, x: &Vector<f64, D>) -> bool {
+    pub(crate) fn contains(&self, x: &Vector<f64, D>) -> bool {
         self.signed_distance(x) <= 0.0
     }
 
     /// Whether `x`, a node or a particle of a grid of this spacing, lies in the solid. A tolerance admits points that round-off moves off
     /// the surface.
-    ///
-    /// ```
-    /// use bfree::shape::{HalfSpace, Shape};
-    /// use bfree::tensor::Vector;
-    ///
-    /// // The node at y = −0.3 + 3 · 0.1 = 5.6e-17, and the half-space y ≤ 0.
-    /// let below = Shape::from(HalfSpace { point: Vector::zeros(), normal: Vector::from([0.0, 1.0]) });
-    /// let node = Vector::from([0.0, -0.3 + 3.0 * 0.1]);
-    /// assert!(!below.contains(&node) && below.holds(&node, 0.1));
-    /// ```
-    pub fn holds(&self, x: &Vector<f64, D>, spacing: f64) -> bool {
+    pub(crate) fn holds(&self, x: &Vector<f64, D>, spacing: f64) -> bool {
         self.signed_distance(x) <= EDGE * spacing
     }
 
@@ -229,18 +206,7 @@ impl<const D: usize> Shape<D> {
     }
 
     /// The part of the surface nearest to `x`, as a smooth function around `x`.
-    ///
-    /// ```
-    /// use bfree::shape::{Block, Feature, Shape};
-    /// use bfree::tensor::Vector;
-    ///
-    /// // Outside a corner of a rectangle, points of equal distance lie on a circle about the corner.
-    /// let rectangle = Shape::from(Block { min: Vector::from([0.0, 0.0]), max: Vector::from([2.0, 1.0]) });
-    /// let corner = Feature::Sphere { center: Vector::from([2.0, 1.0]), radius: 0.0, sign: 1.0 };
-    /// assert_eq!(rectangle.feature(&Vector::from([2.5, 1.5])), corner);
-    /// assert!(matches!(rectangle.feature(&Vector::from([1.0, 1.5])), Feature::Plane { .. }));
-    /// ```
-    pub fn feature(&self, x: &Vector<f64, D>) -> Feature<D> {
+    pub(crate) fn feature(&self, x: &Vector<f64, D>) -> Feature<D> {
         self.solid().feature(x)
     }
 
@@ -250,13 +216,13 @@ impl<const D: usize> Shape<D> {
     /// bound.
     ///
     /// ```
-    /// use bfree::shape::{Ball, HalfSpace, Intersection, Shape};
+    /// use bfree::shape::{Ball, HalfSpace, Shape};
     /// use bfree::tensor::Vector;
     ///
     /// // The lower half of a disc; for an intersection the bound is that of the planes and balls in it.
     /// let disc = Ball { center: Vector::from([0.0, 0.0]), radius: 1.0 };
     /// let below = HalfSpace { point: Vector::from([0.0, 0.0]), normal: Vector::from([0.0, 3.0]) };
-    /// let half = Shape::from(Intersection(vec![disc.into(), below.into()]));
+    /// let half = Shape::intersection(vec![disc.into(), below.into()]);
     /// assert_eq!(half.bounding_box(), (Vector::from([-1.0, -1.0]), Vector::from([1.0, 0.0])));
     /// ```
     pub fn bounding_box(&self) -> (Vector<f64, D>, Vector<f64, D>) {

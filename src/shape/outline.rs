@@ -1,6 +1,6 @@
 //! Surfaces for pictures: simplices on the surface of a solid, and closed lines around a solid in the plane.
 
-use super::{Block, GridBox, Intersection, Shape};
+use super::{Block, GridBox, Shape};
 use crate::grid::{Grid, indices};
 use crate::tensor::Vector;
 
@@ -51,7 +51,7 @@ impl<const D: usize> Shape<D> {
         let (min, max) = self.bounding_box();
         let ends_inside = (0..D).all(|k| min[k] >= of_grid.min[k] && max[k] <= of_grid.max[k]);
         let own = self.clone();
-        let solid = if ends_inside { own } else { Intersection(vec![own, of_grid.into()]).into() };
+        let solid = if ends_inside { own } else { Shape::intersection(vec![own, of_grid.into()]) };
         let mut segments = Vec::new();
         for ends in solid.surface_simplices(grid, edge).chunks_exact(D) {
             let (from, to) = (ends[0], ends[1]);

@@ -35,9 +35,9 @@ fn solids() -> Vec<Shape<3>> {
         a.clone(),
         b.clone(),
         plane.clone(),
-        Union(vec![a.clone(), b.clone()]).into(),
+        Shape::union(vec![a.clone(), b.clone()]),
         Difference { of: Box::new(a.clone()), minus: Box::new(b) }.into(),
-        Intersection(vec![a, plane]).into(),
+        Shape::intersection(vec![a, plane]),
         oblique_cone([0.7, 0.3]).into(),
         oblique_cone([0.0, 0.5]).into(),
         turned_and_scaled(block([-0.5, -0.25, -0.125], [0.5, 0.25, 0.75])),
@@ -150,7 +150,7 @@ fn too_many_or_no_particles_are_refused() {
     assert!(
         matches!(fill(&grid, &all, regular(2, Fill::Cut)), Err(FillError::TooMany { candidates }) if candidates == 8e9)
     );
-    for lost in [ball([7.0; 3], 0.1), ball([0.5; 3], 1e-5), Union(vec![]).into()] {
+    for lost in [ball([7.0; 3], 0.1), ball([0.5; 3], 1e-5), Shape::union(vec![])] {
         assert!(matches!(fill(&grid, &lost, regular(2, Fill::Particles)), Err(FillError::Empty { .. })), "{lost:?}");
     }
 }
@@ -257,4 +257,13 @@ fn outlines_that_bound_no_polygon_are_refused_with_the_vertices() {
     assert_eq!(Polygon::new(vec![vector([0.0; 3]); 3]), Err(PolygonError::Dimension(3)));
     // A vertex on a straight line is no fault.
     assert!(Polygon::new([a, [1.0, 0.0], b, c, d].map(vector).to_vec()).is_ok());
+}
+
+/// A tolerance admits a node that round-off moves off the surface.
+#[test]
+fn a_half_space_holds_a_node_that_rounding_moves_out() {
+    // The node at y = −0.3 + 3 · 0.1 = 5.6e-17, and the half-space y ≤ 0.
+    let below = Shape::from(HalfSpace { point: Vector::zeros(), normal: Vector::from([0.0, 1.0]) });
+    let node = Vector::from([0.0, -0.3 + 3.0 * 0.1]);
+    assert!(!below.contains(&node) && below.holds(&node, 0.1));
 }

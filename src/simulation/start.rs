@@ -146,8 +146,8 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         if weighs { Nodal::mass_alone(&self.particles, supports) } else { Nodal::default() }
     }
 
-    /// The equilibrium problem at time `t`, with given shape functions in the [reference
-    /// configuration](crate::particles::Particles::reference).
+    /// The equilibrium problem at time `t`, with given shape functions in the
+    /// [reference configuration](crate::mechanics::reference).
     ///
     /// ```
     /// use bfree::mechanics::{sweep::Supports, transfer::Nodal};

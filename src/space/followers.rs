@@ -57,14 +57,7 @@ impl<const D: usize> Followers<D> {
 
     /// E on a device; `None` if every node is an unknown.
     pub(crate) fn on_device(&self, gpu: &Gpu) -> Option<gpu::Followers> {
-        if self.is_empty() {
-            return None;
-        }
-        let entry = |(node, weight): (usize, f64)| (node as u32, weight);
-        let mut outer = self.rows().map(|(outer, _, leaders)| (outer as u32, leaders.map(entry).collect()));
-        let inner = self.extension.inner().iter().enumerate();
-        let mut inner = inner.map(|(at, &node)| (node, self.extension.followers(at).map(entry).collect()));
-        Some(gpu::Followers::new(gpu, &mut outer, &mut inner, self.follows.as_flattened()))
+        (!self.is_empty()).then(|| gpu::Followers::new(gpu, self.extension.both(), self.follows.as_flattened()))
     }
 
     /// The row of an outer node; `None` for other nodes.

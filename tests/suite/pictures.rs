@@ -4,7 +4,7 @@ use crate::support::{Failure, built, merged, output, solid};
 use bfree::field::Field;
 use bfree::output::plot::{Look, plot_run};
 use bfree::output::{Outcome, OutputSettings, Recorder, Reference};
-use bfree::shape::{Ball, Block, Shape, Similar, Union, rotation};
+use bfree::shape::{Ball, Block, Shape, Similar, rotation};
 use bfree::simulation::Simulation;
 use bfree::tensor::{Tensor, Vector, identity};
 use serde_json::{Map, Value, json};
@@ -124,7 +124,7 @@ fn bodies_end_at_their_surface_deformed_or_not() -> Result<(), Failure> {
         rotation: rotation(30.0, None).ok_or("plane")?,
         factor: 1.0,
     };
-    let bodies = Shape::from(Union(vec![Ball { center: Vector::from([0.9, 0.9]), radius: 0.8 }.into(), turned.into()]));
+    let bodies = Shape::union(vec![Ball { center: Vector::from([0.9, 0.9]), radius: 0.8 }.into(), turned.into()]);
     // A deformation about the middle of the grid keeps the particles in the drawing.
     let (middle, deformed) = (Vector::from([2.0, 1.0]), Tensor::from([[0.02, 0.03], [-0.05, -0.04]]));
     for h in [Tensor::zeros(), deformed] {

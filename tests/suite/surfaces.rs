@@ -3,10 +3,7 @@
 use crate::support::{Failure, with};
 use bfree::grid::Grid;
 use bfree::scene;
-use bfree::shape::{
-    Ball, Block, Difference, Filling, GridBox, Intersection, Shape, Similar, Surface, SurfaceError, Union, fill,
-    rotation,
-};
+use bfree::shape::{Ball, Block, Difference, Filling, GridBox, Shape, Similar, Surface, SurfaceError, fill, rotation};
 use bfree::tensor::Vector;
 use serde_json::{Value, json};
 use std::f64::consts::{PI, TAU};
@@ -147,7 +144,7 @@ fn the_side_of_a_point_is_right_at_edges_that_bend_inwards() -> Result<(), Failu
     }
     let cross = surface((vertices, triangles))?;
     let bar = |min, max| Shape::from(Block { min: point(min), max: point(max) });
-    let bars = Shape::from(Union(vec![bar([1.0, 0.0, 0.0], [2.0, 3.0, 1.0]), bar([0.0, 1.0, 0.0], [3.0, 2.0, 1.0])]));
+    let bars = Shape::union(vec![bar([1.0, 0.0, 0.0], [2.0, 3.0, 1.0]), bar([0.0, 1.0, 0.0], [3.0, 2.0, 1.0])]);
     for x in points(point([-1.0; 3]), point([4.0, 4.0, 2.0])) {
         let (d, e) = (cross.signed_distance(&x), bars.signed_distance(&x));
         // Outside, the distance from a union is exact; inside it is no larger.
@@ -168,12 +165,12 @@ fn surfaces_are_combined_with_other_shapes() -> Result<(), Failure> {
     let (_, volume, _) = filled(&hole.into(), 0.1, [30, 30, 13])?;
     let of_ball = 4.0 / 3.0 * PI * 0.027;
     assert!(((whole - volume) / of_ball - 1.0).abs() < 1e-3, "{whole} {volume}");
-    let beside = Union(vec![ring.clone(), *ball(center, 0.3)]);
-    let (_, volume, _) = filled(&beside.into(), 0.1, [30, 30, 13])?;
+    let beside = Shape::union(vec![ring.clone(), *ball(center, 0.3)]);
+    let (_, volume, _) = filled(&beside, 0.1, [30, 30, 13])?;
     assert!(((volume - whole) / of_ball - 1.0).abs() < 1e-3, "{whole} {volume}");
     // Halved by a plane of symmetry, where two surfaces meet.
     let half = Block { min: point([0.0; 3]), max: point([3.0, center[1], 1.3]) };
-    let (_, volume, _) = filled(&Intersection(vec![ring, half.into()]).into(), 0.1, [30, 30, 13])?;
+    let (_, volume, _) = filled(&Shape::intersection(vec![ring, half.into()]), 0.1, [30, 30, 13])?;
     assert!((volume / whole - 0.5).abs() < 1e-4, "{whole} {volume}");
     Ok(())
 }

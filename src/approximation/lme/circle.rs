@@ -16,8 +16,8 @@ use argmin::solver::neldermead::NelderMead;
 ///    Newton's method refines it.
 /// 3. N, and ∇N = −N J⁻¹ D with J centred (eq. 27).
 ///
-/// On a wall λ is infinite, so a particle there is moved inside by [`LmeCircle::INSET`] h. The position then has an error of this size;
-/// Σ ∇N = 0 and Σ x ⊗ ∇N = I have none. For large γ̂ the circle holds too few nodes; see [`LmeCircle::largest_gamma`].
+/// On a wall λ is infinite, so a particle there is moved inside by 1e-14 h. The position then has an error of this size;
+/// Σ ∇N = 0 and Σ x ⊗ ∇N = I have none. For large γ̂ the circle holds too few nodes.
 ///
 /// ```
 /// use bfree::approximation::{Lme, LmeCircle, Scratch, ShapeFunction, Support};
@@ -53,7 +53,7 @@ const SEARCH_STEPS: u64 = 2000;
 
 impl LmeCircle {
     /// The smallest distance from a wall, in units of h. A particle closer to the wall, or on the wall, is treated at this distance.
-    pub const INSET: f64 = 1e-14;
+    pub(crate) const INSET: f64 = 1e-14;
 
     /// The functions with locality γ̂ (0.8 … 4 are usual) and support tolerance TOL₀ (1e-6 is usual).
     pub fn new(gamma: f64, tolerance: f64) -> Self {
@@ -62,17 +62,7 @@ impl LmeCircle {
 
     /// The limit −ln TOL₀ / (1 + (D−1)/4), below which γ̂ must stay. Then R_a² > (1 + (D−1)/4) h². So R_a exceeds the distance from the
     /// middle of a cell's side to the next nodes on either hand. Every particle then lies in the convex hull of its nodes.
-    ///
-    /// ```
-    /// use bfree::approximation::{LmeCircle, Validate};
-    ///
-    /// // The smaller the circle, the fewer nodes: in 3D the limit comes first.
-    /// let [line, plane, space] = [1, 2, 3].map(|dimension| LmeCircle::largest_gamma(1e-6, dimension));
-    /// assert!(line > plane && plane > space);
-    /// assert!(LmeCircle::new(0.999 * plane, 1e-6).validate(2).is_ok());
-    /// assert!(LmeCircle::new(1.001 * plane, 1e-6).validate(2).is_err());
-    /// ```
-    pub fn largest_gamma(tolerance: f64, dimension: usize) -> f64 {
+    pub(crate) fn largest_gamma(tolerance: f64, dimension: usize) -> f64 {
         -tolerance.ln() / (1.0 + 0.25 * (dimension as f64 - 1.0))
     }
 
@@ -300,5 +290,13 @@ mod tests {
         // All nodes lie on one side, so log Z falls without limit.
         let nodes = [[0.5, 0.1], [0.5, -0.9], [1.5, 0.1]];
         assert!(Dual { gamma: 3.0, distances: &nodes }.minimize(Vector::zeros(), NEWTON_STEPS).is_none());
+    }
+
+    #[test]
+    fn the_limit_of_the_locality_falls_with_the_dimension() {
+        let [line, plane, space] = [1, 2, 3].map(|dimension| LmeCircle::largest_gamma(1e-6, dimension));
+        assert!(line > plane && plane > space);
+        assert!(LmeCircle::new(0.999 * plane, 1e-6).validate(2).is_ok());
+        assert!(LmeCircle::new(1.001 * plane, 1e-6).validate(2).is_err());
     }
 }

@@ -1,4 +1,4 @@
-// ClosedTangent::product of src/material/closed_tangent.rs, recorded by src/gpu/record.rs. Written by
+// ClosedTangent::product of src/material/closed_tangent.rs, recorded by src/gpu/tests.rs. Written by
 // BFREE_WRITE_KERNELS=1 cargo test --release --lib recorded
 
 FUNCTION void closed_1(const double *rows, const double l[1][1], double out[1][1]) {

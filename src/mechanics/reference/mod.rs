@@ -8,7 +8,7 @@
 //! ```
 //!
 //! The result then does not depend on the number of steps. With a reset in every step, φ is Δφ, and the formulation is updated Lagrangian.
-//! [`Particles::reference`](crate::particles::Particles::reference) is x_k and F_k, and the state of the nodes is a [`Nodal`](crate::mechanics::transfer::Nodal).
+//! [`Particles`](crate::particles::Particles) store x_k and F_k, and the state of the nodes is a [`Nodal`](crate::mechanics::transfer::Nodal).
 //!
 //! **Contact.** Bodies that share nodes stick, and on a grid that is not reset a body cannot leave a wall. The grid is therefore reset when
 //! a particle reaches a prescribed condition or another body (`contact.rs`). Bodies that touch at the start are *bonded*: in load steps they

@@ -29,14 +29,7 @@ fn fall(step: &Step) -> Vec<(f64, f64)> {
 }
 
 /// The norms of several solutions against the iterations, as a picture.
-///
-/// ```
-/// use bfree::output::plot::newton_norms;
-///
-/// let svg = newton_norms("Two steps", &[("step 1", &[1.0, 1e-2, 1e-5]), ("step 2", &[0.1, 1e-4])]).svg();
-/// assert!(svg.starts_with("<svg") && svg.contains("step 2"));
-/// ```
-pub fn newton_norms(title: &str, solutions: &[(&str, &[f64])]) -> Picture {
+pub(crate) fn newton_norms(title: &str, solutions: &[(&str, &[f64])]) -> Picture {
     use palette::{BLACK, BLUE, GREEN, PURPLE, SKY, VERMILLION};
     let colors = [BLUE, VERMILLION, GREEN, PURPLE, SKY, BLACK].iter().cycle();
     let line = |((name, norms), color): (&(&str, &[f64]), &Color)| {

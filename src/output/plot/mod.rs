@@ -24,7 +24,7 @@ mod segments;
 mod table;
 mod view;
 
-pub use convergence::newton_norms;
+pub(crate) use convergence::newton_norms;
 pub use picture::Picture;
 pub use view::View;
 

@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 
 /// The triangles, counter-clockwise as seen from outside, with their neighbours and normals.
 #[derive(Debug, PartialEq)]
-pub struct Mesh {
+pub(crate) struct Mesh {
     pub vertices: Vec<Vector3<f64>>,
     pub triangles: Vec<[u32; 3]>,
     /// The triangle beyond each edge.

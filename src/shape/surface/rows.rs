@@ -44,7 +44,7 @@ pub(crate) fn split(polygon: &[Vector3<f64>], f: impl Fn(&Vector3<f64>) -> f64) 
 }
 
 /// The part of a polygon in −r_k ≤ x_k ≤ r_k, along the axes from `first` on.
-pub fn clipped(mut polygon: Polygon, r: &Vector3<f64>, first: usize) -> Polygon {
+pub(crate) fn clipped(mut polygon: Polygon, r: &Vector3<f64>, first: usize) -> Polygon {
     for k in first..3 {
         polygon = split(&polygon, |x| -r[k] - x[k]).0;
         polygon = split(&polygon, |x| x[k] - r[k]).0;

@@ -29,20 +29,7 @@ struct Parts {
 impl<const D: usize> Sheet<D> {
     /// The sheet of these simplices of D corners, given by the numbers of their vertices. `None` without simplices, if a vertex does not exist, and
     /// in 1D.
-    ///
-    /// ```
-    /// use bfree::shape::{Block, GridBox, Shape, Sheet};
-    /// use bfree::tensor::Vector;
-    ///
-    /// // A quarter of the lower side of a square.
-    /// let quarter = Sheet::new(&[[0.0, 0.0], [0.25, 0.0]].map(Vector::from), &[[0, 1]]).ok_or("no sheet")?.into();
-    /// let square = Shape::from(Block { min: Vector::zeros(), max: Vector::from([1.0, 1.0]) });
-    /// let cell = GridBox { lower: Vector::from([-0.5, -0.5]), edges: Vector::from([1.0, 1.0]), spacing: 1.0 };
-    /// let facets = square.facets(Some(&quarter), &cell);
-    /// assert!(facets.len() == 1 && (facets[0].area - 0.25).abs() < 1e-15);
-    /// # Ok::<(), &str>(())
-    /// ```
-    pub fn new(vertices: &[Vector<f64, D>], simplices: &[[u32; D]]) -> Option<Self> {
+    pub(crate) fn new(vertices: &[Vector<f64, D>], simplices: &[[u32; D]]) -> Option<Self> {
         if !(2..=3).contains(&D) || simplices.is_empty() {
             return None;
         }
@@ -94,5 +81,21 @@ impl<const D: usize> Solid<D> for Sheet<D> {
     fn reach(&self, n: &Vector<f64, D>) -> f64 {
         let n = space(n);
         self.parts.corners.iter().flatten().map(|x| n.dot(x)).fold(f64::NEG_INFINITY, f64::max)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shape::{Block, GridBox, Shape};
+
+    #[test]
+    fn a_sheet_selects_a_part_of_a_surface() {
+        // A quarter of the lower side of a square.
+        let quarter = Sheet::new(&[[0.0, 0.0], [0.25, 0.0]].map(Vector::from), &[[0, 1]]).unwrap().into();
+        let square = Shape::from(Block { min: Vector::zeros(), max: Vector::from([1.0, 1.0]) });
+        let cell = GridBox { lower: Vector::from([-0.5, -0.5]), edges: Vector::from([1.0, 1.0]), spacing: 1.0 };
+        let facets = square.facets(Some(&quarter), &cell);
+        assert!(facets.len() == 1 && (facets[0].area - 0.25).abs() < 1e-15);
     }
 }

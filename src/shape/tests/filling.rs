@@ -30,8 +30,8 @@ fn flat_faces_are_cut_exactly() {
     let hole = Box::new(cube([0.25, 0.25], [0.75, 0.75]));
     let cases: [(Shape<2>, f64, f64); 4] = [
         (Polygon::new(l.to_vec()).unwrap().into(), 4.0, 10.0),
-        (Union(vec![cube([0.0, 0.0], [3.0, 1.0]), cube([0.0, 0.0], [1.0, 2.0])]).into(), 4.0, 10.0),
-        (Union(vec![cube([0.0, 0.0], [3.0, 1.0]), cube([0.0, 1.0], [1.0, 2.0])]).into(), 4.0, 10.0),
+        (Shape::union(vec![cube([0.0, 0.0], [3.0, 1.0]), cube([0.0, 0.0], [1.0, 2.0])]), 4.0, 10.0),
+        (Shape::union(vec![cube([0.0, 0.0], [3.0, 1.0]), cube([0.0, 1.0], [1.0, 2.0])]), 4.0, 10.0),
         (Difference { of: Box::new(cube([0.0, 0.0], [1.0, 1.0])), minus: hole }.into(), 0.75, 6.0),
     ];
     for spacing in [0.5, 0.3, 0.17] {
@@ -181,13 +181,13 @@ fn in_cells_that_are_cut_gauss_points_integrate_products_of_polynomials() {
     let factorial = |n: u32| (1..=n).map(f64::from).product::<f64>();
     for degree in [1, 2, 3] {
         for size in [0.45, 0.999, 2.0] {
-            let corner = Intersection(vec![
+            let corner = Shape::intersection(vec![
                 block([0.0, 0.0], [3.0, 3.0]),
                 HalfSpace { point: vector([size, 0.0]), normal: vector([1.0, 1.0]) }.into(),
             ]);
             let grid = Grid { origin: vector([0.0, 0.0]), spacing: 2.0, cells: [1, 1] };
             let how = Filling { per_axis: 2, layout: Layout::Gauss, degree, ..Filling::default() };
-            let seeds = fill(&grid, &corner.into(), how).unwrap();
+            let seeds = fill(&grid, &corner, how).unwrap();
             assert!(
                 seeds.iter().all(|seed| seed.volume > 0.0 && seed.position.min() > 0.0 && seed.position.sum() < size)
             );

@@ -1,5 +1,6 @@
 //! Interpolation P from a coarse grid to a finer one, and restriction Pᵀ.
 
+use crate::lists::Lists;
 use crate::parallel;
 use crate::tensor::Vector;
 use rustc_hash::FxHashMap;
@@ -11,41 +12,9 @@ const PART: usize = 256;
 #[derive(Clone, Debug, Default)]
 pub(super) struct Interpolation {
     /// The coarse nodes around each finer node.
-    around: Lists,
+    around: Lists<u32>,
     /// The finer nodes that are interpolated from each coarse node, in ascending order.
-    within: Lists,
-}
-
-/// A list of numbers for each node.
-#[derive(Clone, Debug, Default)]
-struct Lists {
-    starts: Vec<u32>,
-    entries: Vec<u32>,
-}
-
-impl Lists {
-    fn of(&self, node: usize) -> &[u32] {
-        &self.entries[self.starts[node] as usize..self.starts[node + 1] as usize]
-    }
-
-    fn len(&self) -> usize {
-        self.starts.len() - 1
-    }
-
-    /// For each of `count` numbers, the nodes whose list has the number.
-    fn transposed(&self, count: usize) -> Self {
-        let mut starts = vec![0; count + 1];
-        self.entries.iter().for_each(|&number| starts[number as usize + 1] += 1);
-        (0..count).for_each(|number| starts[number + 1] += starts[number]);
-        let (mut next, mut entries) = (starts.clone(), vec![0; self.entries.len()]);
-        for node in 0..self.len() {
-            for &number in self.of(node) {
-                entries[next[number as usize] as usize] = node as u32;
-                next[number as usize] += 1;
-            }
-        }
-        Self { starts, entries }
-    }
+    within: Lists<u32>,
 }
 
 /// The nodes of the grid of twice the spacing around the node `index`. Where an index is odd, the node lies halfway between two coarse nodes.
@@ -59,15 +28,14 @@ impl Interpolation {
     /// The interpolation to the nodes with these indices. Returns also the indices of the coarse nodes, and their numbers.
     pub(crate) fn to<const D: usize>(nodes: &[[u32; 3]]) -> (Self, Vec<[u32; 3]>, FxHashMap<[u32; 3], u32>) {
         let (mut coarse, mut numbers) = (Vec::new(), FxHashMap::default());
-        let mut around = Lists { starts: vec![0], entries: Vec::new() };
+        let mut around = Lists::default();
         for &index in nodes {
-            around.entries.extend(between::<D>(index).map(|at| {
+            around.push(between::<D>(index).map(|at| {
                 *numbers.entry(at).or_insert_with(|| {
                     coarse.push(at);
                     coarse.len() as u32 - 1
                 })
             }));
-            around.starts.push(around.entries.len() as u32);
         }
         let within = around.transposed(coarse.len());
         (Self { around, within }, coarse, numbers)
@@ -78,13 +46,13 @@ impl Interpolation {
         (0..self.around.len()).map(|fine| self.row(fine))
     }
 
-    /// Starts and entries of the coarse nodes around each finer node, and of the finer nodes of each coarse node.
-    pub(crate) fn lists(&self) -> [[&[u32]; 2]; 2] {
-        [&self.around, &self.within].map(|lists| [&*lists.starts, &*lists.entries])
+    /// The coarse nodes around each finer node, and the finer nodes of each coarse node.
+    pub(crate) fn lists(&self) -> [&Lists<u32>; 2] {
+        [&self.around, &self.within]
     }
 
     fn row(&self, fine: usize) -> (&[u32], f64) {
-        let list = self.around.of(fine);
+        let list = self.around.row(fine);
         // The number of corners is a power of two.
         (list, 1.0 / list.len() as f64)
     }
@@ -107,7 +75,7 @@ impl Interpolation {
         let mut out = vec![Vector::zeros(); self.within.len()];
         parallel::for_each(out.chunks_mut(PART).enumerate(), &|(part, out): (usize, &mut [Vector<f64, D>])| {
             for (node, out) in out.iter_mut().enumerate() {
-                for &fine in self.within.of(part * PART + node) {
+                for &fine in self.within.row(part * PART + node) {
                     let fine = fine as usize;
                     let weight = self.row(fine).1;
                     (0..D).filter(|&i| !fixed[fine * D + i]).for_each(|i| out[i] += weight * r[fine][i]);

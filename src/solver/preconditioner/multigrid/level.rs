@@ -296,7 +296,6 @@ impl<const D: usize> Level<D> {
 
     /// A copy on a device.
     pub(crate) fn on_device(&self, gpu: &Gpu) -> gpu::Level {
-        let [around, within] = self.interpolation.lists();
         let arrays = gpu::LevelArrays {
             dimension: D,
             neighbours: &self.neighbours,
@@ -304,8 +303,7 @@ impl<const D: usize> Level<D> {
             inverse: bytemuck::cast_slice(&self.inverse),
             held: &self.held,
             fixed_finer: &self.fixed_finer,
-            around,
-            within,
+            interpolation: self.interpolation.lists(),
             followers: self.followers.on_device(gpu),
         };
         gpu::Level::new(gpu, arrays)

@@ -108,7 +108,7 @@ fn the_closed_product_in_c_is_recorded_from_that_in_rust() {
         function::<3>(false),
         function::<3>(true),
     ];
-    let head = "// ClosedTangent::product of src/material/closed_tangent.rs, recorded by src/gpu/record.rs. Written by\n\
+    let head = "// ClosedTangent::product of src/material/closed_tangent.rs, recorded by src/gpu/tests.rs. Written by\n\
                 // BFREE_WRITE_KERNELS=1 cargo test --release --lib recorded\n";
     let recorded = head.to_owned() + &functions.concat();
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/gpu/kernels/closed.h");
