@@ -26,27 +26,6 @@ impl Phase {
 }
 
 /// Measures the phases of a step, one after the other.
-///
-/// ```
-/// use bfree::phases::{Phase, Stopwatch};
-/// use std::time::Instant;
-///
-/// let start = Instant::now();
-/// let mut watch = Stopwatch::start();
-/// let sum: f64 = (1..10_000).map(|i| f64::from(i).recip()).sum();
-/// watch.lap(Phase::Newton, 3);
-/// watch.lap(Phase::Update, 5);
-/// // No time is lost, and none is counted twice.
-/// assert_eq!(watch.passes().iter().sum::<u64>(), 5);
-/// let seconds = watch.seconds();
-/// assert!(sum > 9.0 && seconds[Phase::Newton as usize] > 0.0 && seconds[Phase::Projection as usize] == 0.0);
-/// assert!(seconds.iter().sum::<f64>() <= start.elapsed().as_secs_f64());
-/// // A step that fails after the projection has failed in Newton's method.
-/// let mut watch = Stopwatch::start();
-/// watch.lap(Phase::Projection, 2);
-/// watch.give_up();
-/// assert!(watch.seconds()[Phase::Newton as usize] > 0.0);
-/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Stopwatch {
     last: (Instant, u64),
@@ -58,7 +37,7 @@ pub struct Stopwatch {
 
 impl Stopwatch {
     /// Starts now.
-    pub fn start() -> Self {
+    pub(crate) fn start() -> Self {
         Self { last: (Instant::now(), 0), over: 0, seconds: [0.0; Phase::ALL.len()], passes: [0; Phase::ALL.len()] }
     }
 
@@ -86,5 +65,31 @@ impl Stopwatch {
     /// Loops over the particles in each of [`Phase::ALL`].
     pub fn passes(&self) -> [u64; Phase::ALL.len()] {
         self.passes
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_time_is_lost_and_none_is_counted_twice() {
+        let start = Instant::now();
+        let mut watch = Stopwatch::start();
+        let sum: f64 = (1..10_000).map(|i| f64::from(i).recip()).sum();
+        watch.lap(Phase::Newton, 3);
+        watch.lap(Phase::Update, 5);
+        assert_eq!(watch.passes().iter().sum::<u64>(), 5);
+        let seconds = watch.seconds();
+        assert!(sum > 9.0 && seconds[Phase::Newton as usize] > 0.0 && seconds[Phase::Projection as usize] == 0.0);
+        assert!(seconds.iter().sum::<f64>() <= start.elapsed().as_secs_f64());
+    }
+
+    #[test]
+    fn a_step_that_fails_after_the_projection_has_failed_in_newtons_method() {
+        let mut watch = Stopwatch::start();
+        watch.lap(Phase::Projection, 2);
+        watch.give_up();
+        assert!(watch.seconds()[Phase::Newton as usize] > 0.0);
     }
 }

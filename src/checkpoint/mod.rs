@@ -6,7 +6,7 @@
 //! added in `state.rs`.
 //!
 //! ```
-//! use bfree::checkpoint::{Checkpoints, Identity, forget, restore, unfinished};
+//! use bfree::checkpoint::{Checkpoints, Identity, restore, unfinished};
 //! use bfree::output::{Audience, OutputSettings, Recorder, Reference};
 //!
 //! let (folder, scene) = (tempfile::tempdir()?, bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?);
@@ -32,13 +32,11 @@
 //! assert_eq!(continued.clock.time(), 0.1);
 //! continued.advance()?;
 //! assert_eq!((&continued.particles, continued.clock), (&simulation.particles, simulation.clock));
-//! // A checkpoint can be written at any time, and all checkpoints can be removed.
+//! // A checkpoint can be written at any time.
 //! checkpoints.write(&simulation, &mut recorder)?;
 //! let mut last = start.clone();
 //! restore(&directory, &identity, &mut last)?;
 //! assert_eq!(last.clock, simulation.clock);
-//! forget(&directory)?;
-//! assert!(restore(&directory, &identity, &mut last).is_err());
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
@@ -365,7 +363,7 @@ pub(crate) fn is_checkpoint(name: &str) -> bool {
 ///
 /// # Errors
 /// The operating system refuses.
-pub fn forget(directory: &Path) -> Result<(), CheckpointError> {
+pub(crate) fn forget(directory: &Path) -> Result<(), CheckpointError> {
     for path in NAMES.map(|name| directory.join(name)) {
         match std::fs::remove_file(&path) {
             Err(source) if !matches!(source.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => {

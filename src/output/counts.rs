@@ -6,28 +6,6 @@ use crate::solver::NewtonHistory;
 use serde::{Deserialize, Serialize};
 
 /// Counts over all steps. Iterations, residuals and tangent products of failed attempts at a step are included.
-///
-/// ```
-/// use bfree::output::report::Counts;
-/// use bfree::simulation::FailedAttempt;
-///
-/// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
-/// let mut simulation = scene.build::<2>("scenes".as_ref())?;
-/// let (mut counts, step) = (Counts::default(), simulation.advance()?);
-/// counts.add(&step);
-/// counts.add(&simulation.advance()?);
-/// assert_eq!((counts.steps, counts.max_active_nodes), (2, step.active_nodes));
-/// // A failed attempt is counted, too.
-/// let newton = step.newton.history.clone();
-/// let before = counts.residual_evaluations;
-/// let why = "no equilibrium was found".into();
-/// let seconds = bfree::phases::Stopwatch::start();
-/// counts.add_failed(&[FailedAttempt { dt: 0.05, inaccurate: false, why, projection_iterations: 7, newton, seconds }]);
-/// assert_eq!((counts.steps, counts.failed_attempts), (2, 1));
-/// assert_eq!(counts.residual_evaluations, before + step.newton.history.counts.residuals as u64);
-/// assert_eq!(counts.projection_iterations, 7); // none by the steps, whose mass is lumped
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Counts {
@@ -70,7 +48,7 @@ pub struct Counts {
 
 impl Counts {
     /// Adds a step.
-    pub fn add<const D: usize>(&mut self, step: &StepReport<D>) {
+    pub(crate) fn add<const D: usize>(&mut self, step: &StepReport<D>) {
         let newton = &step.newton.history;
         self.max_active_nodes = self.max_active_nodes.max(step.active_nodes);
         self.steps += 1;
@@ -104,21 +82,6 @@ impl Counts {
 }
 
 /// Seconds of a run. Seconds of steps are summed over all steps.
-///
-/// ```
-/// use bfree::output::report::Seconds;
-///
-/// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
-/// let mut simulation = scene.build::<2>("scenes".as_ref())?;
-/// let (start, mut seconds) = (std::time::Instant::now(), Seconds::default());
-/// seconds.add(&simulation.step()?);
-/// seconds.add(&simulation.step()?);
-/// seconds.total = start.elapsed().as_secs_f64();
-/// // The named parts add up to the total.
-/// let sum: f64 = seconds.named().map(|(_, seconds)| seconds).sum();
-/// assert!((sum / seconds.total - 1.0).abs() < 1e-12);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Seconds {
@@ -136,7 +99,7 @@ pub struct Seconds {
 
 impl Seconds {
     /// Adds the phases of a step.
-    pub fn add<const D: usize>(&mut self, step: &StepReport<D>) {
+    pub(crate) fn add<const D: usize>(&mut self, step: &StepReport<D>) {
         self.add_phases(&step.seconds);
         self.add_failed(&step.failed);
     }
@@ -151,11 +114,51 @@ impl Seconds {
     }
 
     /// The set-up, the phases by name, the output, and `other`: the remaining seconds, such as those of checkpoints.
-    pub fn named(&self) -> impl Iterator<Item = (&'static str, f64)> + '_ {
+    pub(crate) fn named(&self) -> impl Iterator<Item = (&'static str, f64)> + '_ {
         let other = self.total - self.set_up - self.phases.iter().sum::<f64>() - self.output;
         let phases = Phase::ALL.iter().map(|phase| phase.1).zip(self.phases);
         std::iter::once(("set_up", self.set_up))
             .chain(phases)
             .chain([("output", self.output), ("other", other.max(0.0))])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    type Result = std::result::Result<(), Box<dyn std::error::Error>>;
+
+    #[test]
+    fn a_failed_attempt_is_counted_beside_the_steps() -> Result {
+        let scene = crate::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+        let mut simulation = scene.build::<2>("scenes".as_ref())?;
+        let (mut counts, step) = (Counts::default(), simulation.advance()?);
+        counts.add(&step);
+        counts.add(&simulation.advance()?);
+        assert_eq!((counts.steps, counts.max_active_nodes), (2, step.active_nodes));
+        let newton = step.newton.history.clone();
+        let before = counts.residual_evaluations;
+        let (why, seconds) = ("no equilibrium was found".into(), Stopwatch::start());
+        let failed = FailedAttempt { dt: 0.05, inaccurate: false, why, projection_iterations: 7, newton, seconds };
+        counts.add_failed(&[failed]);
+        assert_eq!((counts.steps, counts.failed_attempts), (2, 1));
+        assert_eq!(counts.residual_evaluations, before + step.newton.history.counts.residuals as u64);
+        // The steps have none, because their mass is lumped.
+        assert_eq!(counts.projection_iterations, 7);
+        Ok(())
+    }
+
+    #[test]
+    fn the_named_seconds_add_up_to_the_total() -> Result {
+        let scene = crate::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+        let mut simulation = scene.build::<2>("scenes".as_ref())?;
+        let (start, mut seconds) = (std::time::Instant::now(), Seconds::default());
+        seconds.add(&simulation.step()?);
+        seconds.add(&simulation.step()?);
+        seconds.total = start.elapsed().as_secs_f64();
+        let sum: f64 = seconds.named().map(|(_, seconds)| seconds).sum();
+        assert!((sum / seconds.total - 1.0).abs() < 1e-12);
+        Ok(())
     }
 }

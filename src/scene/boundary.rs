@@ -157,16 +157,7 @@ pub(super) fn curves<'a>(
 
 impl Boundary {
     /// The condition at the lower (`false`) or upper (`true`) face of an axis.
-    ///
-    /// ```
-    /// use bfree::scene::boundary::Face;
-    ///
-    /// // The cantilever is clamped at its left end, x = 0; what the scene does not mention is free.
-    /// let boundary = bfree::scene::read_file("scenes/cantilever.json".as_ref(), &[])?.boundary;
-    /// assert_eq!((boundary.face(0, false), boundary.face(1, true)), (&Face::Fixed, &Face::Free));
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    pub fn face(&self, axis: usize, upper: bool) -> &Face {
+    pub(super) fn face(&self, axis: usize, upper: bool) -> &Face {
         self.faces()[2 * axis + usize::from(upper)].1.unwrap_or(&Face::Free)
     }
 

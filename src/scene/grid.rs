@@ -42,16 +42,12 @@ pub struct GridBox {
 
 impl GridBox {
     /// The number of dimensions, 1 to 3 in a valid scene.
-    ///
-    /// Example: [`Self::build`].
-    pub fn dimension(&self) -> usize {
+    pub(super) fn dimension(&self) -> usize {
         self.size.len()
     }
 
     /// The lower corner, zeros if not given.
-    ///
-    /// Example: [`Self::build`].
-    pub fn origin(&self) -> Vec<f64> {
+    pub(super) fn origin(&self) -> Vec<f64> {
         self.origin.clone().unwrap_or_else(|| vec![0.0; self.size.len()])
     }
 
@@ -61,37 +57,19 @@ impl GridBox {
     }
 
     /// The grid; `None` unless the section is valid and of dimension `D`.
-    ///
-    /// ```
-    /// use bfree::scene::grid::GridBox;
-    ///
-    /// let section: GridBox = serde_json::from_str(r#"{"size": [2, 1], "spacing": 0.25}"#)?;
-    /// assert_eq!((section.dimension(), section.origin(), section.cells()), (2, vec![0.0, 0.0], Some(vec![8, 4])));
-    /// assert!(section.holds(&[2.0, 0.5]) && !section.holds(&[2.1, 0.5]));
-    /// let grid = section.build::<2>().ok_or("a plane grid")?;
-    /// assert_eq!(grid.position([8, 4]).as_slice(), section.size);
-    /// // Three quarters of a cell are not a whole number of cells.
-    /// let section: GridBox = serde_json::from_str(r#"{"size": [2, 1], "spacing": 0.8}"#)?;
-    /// assert_eq!((section.cells(), section.build::<2>()), (None, None));
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    pub fn build<const D: usize>(&self) -> Option<Grid<D>> {
+    pub(super) fn build<const D: usize>(&self) -> Option<Grid<D>> {
         let cells = self.cells()?.try_into().ok()?;
         let origin: [f64; D] = self.origin().try_into().ok()?;
         Some(Grid { origin: Vector::from(origin), spacing: self.spacing, cells })
     }
 
     /// Whether a point lies in the box or on its faces; false if the section is not valid.
-    ///
-    /// Example: [`Self::build`].
-    pub fn holds(&self, x: &[f64]) -> bool {
+    pub(super) fn holds(&self, x: &[f64]) -> bool {
         let edges = self.origin().into_iter().zip(&self.size);
         self.cells().is_some() && x.iter().zip(edges).all(|(x, (lower, size))| *x >= lower && *x <= lower + size)
     }
 
     /// The cells along each axis; `None` unless the section is valid.
-    ///
-    /// Example: [`Self::build`].
     pub fn cells(&self) -> Option<Vec<u32>> {
         let origin = self.origin();
         let sound =
@@ -150,5 +128,22 @@ impl GridBox {
             let far = sensible(x) && x.abs() > farthest;
             problems.require(!far, &format!("grid.origin[{k}]"), Number(x), &allowed);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_grid_fills_the_box_with_a_whole_number_of_cells() -> Result<(), Box<dyn std::error::Error>> {
+        let section: GridBox = serde_json::from_str(r#"{"size": [2, 1], "spacing": 0.25}"#)?;
+        assert_eq!((section.dimension(), section.origin(), section.cells()), (2, vec![0.0, 0.0], Some(vec![8, 4])));
+        assert!(section.holds(&[2.0, 0.5]) && !section.holds(&[2.1, 0.5]));
+        let grid = section.build::<2>().ok_or("a plane grid")?;
+        assert_eq!(grid.position([8, 4]).as_slice(), section.size);
+        let section: GridBox = serde_json::from_str(r#"{"size": [2, 1], "spacing": 0.8}"#)?;
+        assert_eq!((section.cells(), section.build::<2>()), (None, None));
+        Ok(())
     }
 }

@@ -5,37 +5,38 @@
 //! the text is wrong, or all values that are not allowed.
 
 pub mod accuracy;
-pub mod body;
-pub mod boundary;
-pub mod contact;
-mod contacts;
-pub mod curve;
-mod free;
-pub mod grid;
-pub mod image_file;
 pub mod keys;
-pub mod load;
 pub mod mesh_file;
-pub mod obstacle;
-pub mod output;
 pub mod particle_file;
-pub mod shape;
-pub mod solver;
 pub mod surface_file;
-pub mod time;
-pub mod transfer;
 
+pub(crate) mod output;
+pub(crate) mod time;
+
+mod body;
+mod boundary;
 mod build;
 mod build_error;
+mod contact;
+mod contacts;
+mod curve;
 mod defaults;
 mod file;
 mod filling;
+mod free;
+mod grid;
+mod image_file;
 mod json;
+mod load;
 mod loading;
 mod msh;
+mod obstacle;
 mod overrides;
 mod place;
 mod read;
+mod shape;
+mod solver;
+mod transfer;
 mod vector;
 mod warnings;
 

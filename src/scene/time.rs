@@ -66,36 +66,12 @@ pub struct Adaptive {
 
 impl Time {
     /// The time integration scheme.
-    ///
-    /// ```
-    /// use bfree::mechanics::schemes::Parameters;
-    /// use bfree::scene::time::Time;
-    ///
-    /// // The old key `inertia` is read, unless the new key `scheme` is given.
-    /// let scheme = |text: &str| serde_json::from_str(text).map(|time: Time| time.scheme());
-    /// assert_eq!(scheme(r#"{"step": 0.1, "end": 1}"#)?, Parameters::Newmark);
-    /// assert_eq!(scheme(r#"{"step": 0.1, "end": 1, "inertia": "none"}"#)?, Parameters::None);
-    /// assert_eq!(scheme(r#"{"step": 0.1, "end": 1, "scheme": "arc_length", "inertia": "none"}"#)?, Parameters::ArcLength);
-    /// # Ok::<(), serde_json::Error>(())
-    /// ```
-    pub fn scheme(&self) -> schemes::Parameters {
+    pub(super) fn scheme(&self) -> schemes::Parameters {
         self.scheme.or(self.inertia).unwrap_or_default()
     }
 
     /// Newmark's β and γ.
-    ///
-    /// ```
-    /// use bfree::mechanics::schemes::Newmark;
-    /// use bfree::scene::time::Time;
-    ///
-    /// // A scene that says nothing of them gets the trapezoidal rule.
-    /// let time: Time = serde_json::from_str(r#"{"step": 0.1, "end": 1}"#)?;
-    /// assert_eq!(time.newmark(), Newmark::default());
-    /// let time: Time = serde_json::from_str(r#"{"step": 0.1, "end": 1, "beta": 0.3, "gamma": 0.6}"#)?;
-    /// assert_eq!(time.newmark(), Newmark { beta: 0.3, gamma: 0.6 });
-    /// # Ok::<(), serde_json::Error>(())
-    /// ```
-    pub fn newmark(&self) -> Newmark {
+    pub(super) fn newmark(&self) -> Newmark {
         let default = Newmark::default();
         Newmark { beta: self.beta.unwrap_or(default.beta), gamma: self.gamma.unwrap_or(default.gamma) }
     }
