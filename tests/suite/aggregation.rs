@@ -184,9 +184,6 @@ fn nodes_follow_where_mass_does_not_hold_them() -> Result<(), Failure> {
         (&[][..], true),
         (&["approximation=\"linear\""], true),
         (&["aggregation=false"], false),
-        (&["ghost_stiffness=0"], false),
-        (&["ghost_stiffness=0.02"], true),
-        (&["ghost_stiffness=0.02", "aggregation=false"], false),
     ] {
         assert_eq!(asked("column_static.json", overrides)?, follow, "{overrides:?}");
     }
