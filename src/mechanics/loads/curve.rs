@@ -1,5 +1,7 @@
 //! Factors in time.
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
 /// A piecewise-linear function of time, constant before its first and after its last point, or a sine.
@@ -23,16 +25,25 @@ enum Kind {
 }
 
 /// mean + amplitude · sin(2π frequency t + phase)
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
 pub struct Sine {
-    /// The mean.
+    /// The mean. Default: 0.
+    #[serde(default)]
     pub mean: f64,
-    /// The amplitude.
+    /// The amplitude. Default: 1.
+    #[serde(default = "default_amplitude")]
     pub amplitude: f64,
     /// The frequency (1/time), > 0.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub frequency: f64,
-    /// The phase (radians).
+    /// The phase (radians). Default: 0.
+    #[serde(default)]
     pub phase: f64,
+}
+
+fn default_amplitude() -> f64 {
+    1.0
 }
 
 impl Sine {
