@@ -1,8 +1,9 @@
 //! Builds a simulation from a checked scene. Here and nowhere else, the dimension becomes a type: see [`Scene::dimension`].
 
-use super::boundary;
+use super::boundary::Prescribed;
 use super::curve::Curve;
 use super::filling::Builder;
+use super::obstacle::Obstacle;
 use super::transfer::Transfer;
 use super::vector::vector;
 use super::{BuildError, Problems, Scene, shape};
@@ -164,14 +165,13 @@ impl Scene {
         let loads = self.surface_loads();
         let loads = loads.filter_map(|(path, load)| Some((format!("{path}.curve"), load.curve.as_ref()?)));
         let faces = self.boundary.faces().into_iter();
-        let faces = faces.filter_map(|(name, face)| face?.curve(&format!("boundary.{name}")));
-        let prescribed = self.prescribed.iter().enumerate().flat_map(|(i, one)| {
-            boundary::curves([&one.displacement, &one.velocity], &one.rotation, &format!("prescribed[{i}]"))
-        });
-        let obstacles = self.obstacles.iter().enumerate().flat_map(|(i, one)| {
-            boundary::curves([&one.displacement, &one.velocity], &one.rotation, &format!("obstacles[{i}]"))
-        });
-        gravity.chain(loads).chain(faces).chain(prescribed).chain(obstacles).collect()
+        let faces = faces.filter_map(|(name, face)| face?.given()?.curve(&format!("boundary.{name}")));
+        let prescribed = self.prescribed.iter().map(Prescribed::given).enumerate();
+        let prescribed = prescribed.map(|(i, given)| (format!("prescribed[{i}]"), given));
+        let obstacles = self.obstacles.iter().map(Obstacle::given).enumerate();
+        let given = prescribed.chain(obstacles.map(|(i, given)| (format!("obstacles[{i}]"), given)));
+        let given = given.flat_map(|(path, given)| given.into_iter().filter_map(move |motion| motion.curve(&path)));
+        gravity.chain(loads).chain(faces).chain(given).collect()
     }
 
     fn settings(&self) -> Settings {

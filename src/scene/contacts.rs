@@ -2,6 +2,7 @@
 
 use super::BuildError;
 use super::body::Body;
+use super::boundary::Face;
 use super::filling::Builder;
 use super::free::surface;
 use super::load::{Loaded, Stress};
@@ -42,7 +43,8 @@ impl<const D: usize> Builder<'_, D> {
         let mut contacts = Contacts::default();
         for (i, one) in scene.obstacles.iter().enumerate() {
             let path = format!("obstacles[{i}]");
-            let (shape, motion) = (one.shape.built(&path)?, one.motion().motion(0)?);
+            let (shape, given) = (one.shape.built(&path)?, one.given());
+            let motion = given.first().map_or_else(|| Face::Fixed.motion(0), |given| given.motion())?;
             let free = one.free.as_ref().map(|free| free.build(&path, &shape, gravity)).transpose()?;
             let obstacle =
                 Obstacle::new(one.name.clone(), shape, motion, one.stiffness.unwrap_or(stiffness), one.friction);

@@ -280,11 +280,11 @@ impl Scene {
             problems.refuse(&format!("pressures[{i}]"), "a follower pressure", allowed);
         }
         for (name, face) in self.boundary.faces() {
-            let moves = face.is_some_and(boundary::Face::moves);
+            let moves = face.and_then(boundary::Face::given).is_some_and(boundary::MotionOf::moves);
             problems.require(!moves, &format!("boundary.{name}"), "a motion", allowed);
         }
         for (i, prescribed) in self.prescribed.iter().enumerate() {
-            let moves = prescribed.given().iter().any(|(_, motion)| motion.moves());
+            let moves = prescribed.given().iter().any(|motion| motion.moves());
             problems.require(!moves, &format!("prescribed[{i}]"), "a motion", allowed);
         }
         for i in 0..self.obstacles.len() {
