@@ -152,12 +152,12 @@ pub enum CheckpointError {
         directory: PathBuf,
     },
     /// The directory has checkpoints, but none can be used.
-    #[error("no checkpoint in {} can be used: {}", directory.display(), list(unusable))]
+    #[error("no checkpoint in {} can be used: {}", directory.display(), unusable.join("; "))]
     NoneGood {
         /// The directory of the results.
         directory: PathBuf,
         /// All checkpoints, with reasons.
-        unusable: Vec<Unusable>,
+        unusable: Vec<String>,
     },
     /// The scene has changed.
     #[error(
@@ -184,20 +184,6 @@ pub enum CheckpointError {
         /// The quantity of the particles, or the key of the curve, that differs.
         array: String,
     },
-}
-
-/// A checkpoint that cannot be used.
-#[derive(Debug, thiserror::Error)]
-#[error("{}: {reason}", path.display())]
-pub struct Unusable {
-    /// The file.
-    pub path: PathBuf,
-    /// The reason.
-    pub reason: String,
-}
-
-fn list(unusable: &[Unusable]) -> String {
-    unusable.iter().map(Unusable::to_string).collect::<Vec<_>>().join("; ")
 }
 
 /// Writes the checkpoints of a run.
@@ -283,8 +269,8 @@ pub struct Restored {
     pub mark: Mark,
     /// Snapshots that were written before the checkpoint and are missing now.
     pub missing: Vec<PathBuf>,
-    /// Newer checkpoints and unreadable checkpoints, which could not be used.
-    pub unusable: Vec<Unusable>,
+    /// Newer checkpoints and unreadable checkpoints, which could not be used, with reasons.
+    pub unusable: Vec<String>,
     /// The program that wrote the checkpoint, if it was another version. The results may then differ in their bits.
     pub other_program: Option<String>,
 }
@@ -304,7 +290,7 @@ pub fn restore<const D: usize, L, A>(
         match read(&path) {
             Ok((content, arrays)) => candidates.push((slot, path, content, arrays)),
             Err(Damage::Io(error)) if error.kind() == ErrorKind::NotFound => {}
-            Err(damage) => unusable.push(Unusable { path, reason: damage.to_string() }),
+            Err(damage) => unusable.push(format!("{}: {damage}", path.display())),
         }
     }
     if candidates.is_empty() && unusable.is_empty() {
@@ -321,7 +307,7 @@ pub fn restore<const D: usize, L, A>(
                 let missing = mark.missing(directory);
                 return Ok(Restored { path, place: (slot, clock.steps()), mark, missing, unusable, other_program });
             }
-            Err(reason) => unusable.push(Unusable { path, reason }),
+            Err(reason) => unusable.push(format!("{}: {reason}", path.display())),
         }
     }
     Err(CheckpointError::NoneGood { directory: directory.to_owned(), unusable })
