@@ -142,11 +142,7 @@ impl Shape {
     /// The corners of the bounding box; `None` if the shape is not allowed, with the reasons in `problems`, and while its file has not been
     /// read.
     pub(super) fn check(&self, problems: &mut Problems, path: &str, dimension: usize) -> Option<[Vec<f64>; 2]> {
-        match dimension {
-            1 => self.checked::<1>(problems, path).map(bounds),
-            2 => self.checked::<2>(problems, path).map(bounds),
-            _ => self.checked::<3>(problems, path).map(bounds),
-        }
+        in_dimensions!(dimension, D => self.checked::<D>(problems, path).map(bounds))
     }
 
     /// The geometry; `None` if it is not allowed, with the reasons in `problems`, and while its file has not been read.
