@@ -238,15 +238,13 @@ impl Scene {
 
     /// The parts of the scene that make the tangent unsymmetric.
     fn unsymmetric(&self) -> Unsymmetric {
-        let of_obstacles = self.obstacles.iter().map(|obstacle| obstacle.friction);
-        let mut frictions = of_obstacles.chain(self.contact.iter().map(|contact| contact.friction));
         Unsymmetric {
             path: self.time.scheme() == Parameters::ArcLength,
             mean_stress: self.time.scheme() == Parameters::EnergyMomentum,
             // A scene that asks for conjugate gradients gets the displacement form.
             mixed: false,
             pressure: !self.pressures.is_empty(),
-            friction: frictions.any(|friction| friction > 0.0),
+            friction: self.has_friction(),
             free_obstacle: self.obstacles.iter().any(|obstacle| obstacle.free.is_some()),
             law: self.laws().any(|law| !law.is_symmetric()),
         }

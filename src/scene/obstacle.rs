@@ -3,6 +3,7 @@
 use super::boundary::{MotionOf, Rotation, Table, check_motions};
 use super::free::Free;
 use super::shape::Shape;
+use crate::mechanics::loads::ContactConstants;
 use crate::problems::Problems;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -58,6 +59,11 @@ pub(super) fn too_stiff(path: &str, stiffness: Option<f64>) -> Option<String> {
 }
 
 impl Obstacle {
+    /// The constants of the law, with the default of its stiffness.
+    pub(super) fn constants(&self, stiffness: f64) -> ContactConstants {
+        ContactConstants { stiffness: self.stiffness.unwrap_or(stiffness), friction: self.friction }
+    }
+
     /// All given motions; a checked scene has at most one.
     pub(super) fn given(&self) -> Vec<MotionOf<'_>> {
         MotionOf::all(&self.displacement, &self.velocity, &self.rotation)
