@@ -188,9 +188,9 @@ impl Scene {
             wall_update: self.time.wall_update.unwrap_or_default(),
             smoothing: match self.transfer.unwrap_or_default() {
                 Transfer::Flip => None,
-                Transfer::Pic(pic) => Some(Smoothing::uniform(pic.order, f64::INFINITY)),
-                Transfer::Blend(blend) => Some(Smoothing::uniform(blend.order, blend.rate)),
-                Transfer::Limited(limited) => Some(Smoothing::limited(limited.rate)),
+                Transfer::Pic { order } => Some(Smoothing::uniform(order, f64::INFINITY)),
+                Transfer::Blend { order, rate } => Some(Smoothing::uniform(order, rate)),
+                Transfer::Limited { rate } => Some(Smoothing::limited(rate)),
             },
             newton: NewtonSettings {
                 relative_tolerance: newton.tolerance,

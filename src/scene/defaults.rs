@@ -91,10 +91,7 @@ impl Scene {
     /// The default stiffness of contact. A contact that is too stiff for the step makes bodies vibrate, and loses energy.
     pub(super) fn contact_stiffness(&self) -> f64 {
         let [most, of_courant] = STIFFNESS;
-        let speed = |body: &Body| {
-            let law = body.material.law(&mut Problems::default(), "")?;
-            Some((contact_modulus(&law) / body.density).sqrt())
-        };
+        let speed = |body: &Body| Some((contact_modulus(&body.law()?) / body.density).sqrt());
         let fastest = self.bodies.iter().filter_map(speed).fold(0.0, f64::max);
         let courant = fastest * self.time.step / self.grid.spacing;
         if self.time.scheme().has_inertia() && courant * most > of_courant { of_courant / courant } else { most }

@@ -233,7 +233,7 @@ impl Scene {
 
     /// The laws of all bodies whose constants are allowed.
     fn laws(&self) -> impl Iterator<Item = Material> {
-        self.bodies.iter().filter_map(|body| body.material.law(&mut Problems::default(), ""))
+        self.bodies.iter().filter_map(body::Body::law)
     }
 
     /// The parts of the scene that make the tangent unsymmetric.
