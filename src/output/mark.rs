@@ -43,14 +43,12 @@ impl Mark {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
 
     use crate::output::{Audience, OutputSettings, Recorder, Reference};
 
     #[test]
     fn a_file_is_continued_at_the_mark_if_it_still_holds_what_it_did() -> Result<(), Box<dyn std::error::Error>> {
-        let (folder, scene) =
-            (tempfile::tempdir()?, crate::scene::read_file("scenes/rebound.json".as_ref(), &[])?);
+        let (folder, scene) = (tempfile::tempdir()?, crate::scene::read_file("scenes/rebound.json".as_ref(), &[])?);
         let (mut simulation, directory) = (scene.build::<2>("scenes".as_ref())?, folder.path().to_owned());
         let (fields, probes, audience) = (vec![], vec![], Audience::Nobody);
         let settings = OutputSettings { directory, fields, snapshot_every: None, probes, end_time: 1.0, audience };

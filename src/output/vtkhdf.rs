@@ -19,7 +19,10 @@ const CHUNK: usize = 1 << 15;
 ///
 /// # Errors
 /// There are no snapshots, a snapshot is damaged or has other fields than the first, or the operating system refuses.
-pub(crate) fn pack(directory: &Path, bodies: &[String]) -> std::result::Result<Vec<(PathBuf, [usize; 2])>, OutputError> {
+pub(crate) fn pack(
+    directory: &Path,
+    bodies: &[String],
+) -> std::result::Result<Vec<(PathBuf, [usize; 2])>, OutputError> {
     let mut written = Vec::new();
     for series in SERIES {
         let (files, missing): (Vec<_>, Vec<_>) =

@@ -1,6 +1,6 @@
 //! The contacts of the bodies: with rigid obstacles, and with each other.
 
-use super::{Obstacle, SurfacePoint};
+use super::{ContactConstants, Obstacle, SurfacePoint};
 use crate::tensor::Vector;
 use std::collections::BTreeMap;
 
@@ -17,27 +17,6 @@ pub struct Contacts<const D: usize> {
     pub obstacles: Vec<Obstacle<D>>,
     /// Contact between bodies; `None` if bodies stick to each other where they share nodes.
     pub between: Option<BodyContact<D>>,
-}
-
-/// The constants of the law of contact.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct ContactConstants {
-    /// The penalty stiffness (pressure per depth) in units of min(Λ + 2G, 4G)/h of the body, or of the softer one of two, > 0.
-    pub stiffness: f64,
-    /// The coefficient of friction μ, ≥ 0.
-    pub friction: f64,
-}
-
-impl ContactConstants {
-    /// Whether friction acts.
-    pub(crate) fn has_friction(&self) -> bool {
-        self.friction > 0.0
-    }
-
-    /// The constants with the stiffness in another unit, one of which is `unit` of these.
-    pub(crate) fn scaled(&self, unit: f64) -> Self {
-        Self { stiffness: self.stiffness * unit, ..*self }
-    }
 }
 
 /// Contact between bodies of different nodal fields. Every point of a surface that enters another body is pushed out of it, and slides on it

@@ -14,11 +14,11 @@ mod rotation;
 
 pub(crate) use at_surface::at_surface_points;
 pub(crate) use contacts::{Added, PointInContact};
-pub use contacts::{BodyContact, Candidate, ContactConstants, Contacts, Pair, Share};
+pub use contacts::{BodyContact, Candidate, Contacts, Pair, Share};
 pub use curve::{Curve, CurveError, Sine};
 pub use force_field::{Field, ForceField};
 pub use motion_step::MotionStep;
-pub use obstacle::Obstacle;
+pub use obstacle::{ContactConstants, Obstacle};
 pub use pose::Pose;
 pub use prescribed::{Motion, Prescribed, PrescribedDof, Reaction, Selection, prescribed_dofs};
 pub use rayleigh::Rayleigh;

@@ -1,10 +1,31 @@
 //! Rigid obstacles that bodies touch: their shape, their motion, and the state of their friction.
 
 use super::prescribed::Motion;
-use super::{ContactConstants, Pose, RigidBody, SurfacePoint};
+use super::{Pose, RigidBody, SurfacePoint};
 use crate::grid::Grid;
 use crate::shape::Shape;
 use crate::tensor::{Vector, identity};
+
+/// The constants of the law of contact.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ContactConstants {
+    /// The penalty stiffness (pressure per depth) in units of min(Λ + 2G, 4G)/h of the body, or of the softer one of two, > 0.
+    pub stiffness: f64,
+    /// The coefficient of friction μ, ≥ 0.
+    pub friction: f64,
+}
+
+impl ContactConstants {
+    /// Whether friction acts.
+    pub(crate) fn has_friction(&self) -> bool {
+        self.friction > 0.0
+    }
+
+    /// The constants with the stiffness in another unit, one of which is `unit` of these.
+    pub(crate) fn scaled(&self, unit: f64) -> Self {
+        Self { stiffness: self.stiffness * unit, ..*self }
+    }
+}
 
 /// A rigid obstacle. Bodies touch it without adhesion, with Coulomb friction.
 #[derive(Clone, Debug, PartialEq)]
