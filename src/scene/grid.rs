@@ -50,7 +50,7 @@ impl GridBox {
     }
 
     /// The grid; `None` unless the section is valid and of dimension `D`.
-    pub(super) fn build<const D: usize>(&self) -> Option<Grid<D>> {
+    pub fn build<const D: usize>(&self) -> Option<Grid<D>> {
         let cells = self.cells()?.try_into().ok()?;
         let origin: [f64; D] = self.origin().try_into().ok()?;
         Some(Grid { origin: Vector::from(origin), spacing: self.spacing, cells })

@@ -107,7 +107,7 @@ pub enum Shape {
 
 impl Shape {
     /// The geometry; `None` unless every vector has `D` components and [`Scene::check`](super::Scene::check) finds nothing wrong.
-    pub(super) fn build<const D: usize>(&self) -> Option<shape::Shape<D>> {
+    pub fn build<const D: usize>(&self) -> Option<shape::Shape<D>> {
         self.checked(&mut Problems::default(), "")
     }
 
