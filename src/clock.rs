@@ -12,21 +12,9 @@ const TICKS: u64 = 1 << MAX_HALVINGS;
 const TIME_TOLERANCE: f64 = 1e-6;
 
 /// The part of a clock that changes in a run. Checkpoints store it.
-///
-/// ```
-/// use bfree::clock::{Clock, Reached};
-///
-/// let mut clock = Clock::new(0.1, 2);
-/// clock.advance();
-/// clock.advance();
-/// // A round trip through a file.
-/// let read: Reached = serde_json::from_str(&serde_json::to_string(&clock.reached())?)?;
-/// assert_eq!((read.steps(), Clock::new(0.1, 2).at(read)), (2, Some(clock)));
-/// # Ok::<(), serde_json::Error>(())
-/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Reached {
+pub(crate) struct Reached {
     /// Time since the start, in ticks of Δt / 2^[`MAX_HALVINGS`].
     ticks: u64,
     /// The current step is Δt / 2^level.
@@ -37,7 +25,7 @@ pub struct Reached {
 
 impl Reached {
     /// Steps taken.
-    pub fn steps(&self) -> u64 {
+    pub(crate) fn steps(&self) -> u64 {
         self.steps
     }
 }
@@ -59,7 +47,6 @@ impl Reached {
 /// clock.advance();
 /// assert_eq!((clock.step(), clock.nominal()), (0.05, 0.1));
 /// assert_eq!((clock.steps(), clock.nominal_steps(), clock.on_nominal()), (1001, 1000, false));
-/// assert_eq!(Clock::new(0.1, 20).at(clock.reached()), Some(clock));
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Clock {
@@ -77,26 +64,12 @@ impl Clock {
     }
 
     /// The steps and the time reached.
-    pub fn reached(&self) -> Reached {
+    pub(crate) fn reached(&self) -> Reached {
         self.reached
     }
 
     /// This clock, set to what another clock with the same nominal step has reached. `None` if this clock cannot reach it.
-    ///
-    /// ```
-    /// use bfree::clock::Clock;
-    ///
-    /// // A checkpoint stores the steps and the time reached, and a run continues from them.
-    /// let mut clock = Clock::new(0.1, 2);
-    /// clock.halve();
-    /// clock.advance();
-    /// let reached = clock.reached();
-    /// assert_eq!(reached.steps(), 1);
-    /// assert_eq!(Clock::new(0.1, 2).at(reached), Some(clock));
-    /// // A run that may not halve its steps cannot be in the middle of one.
-    /// assert_eq!(Clock::new(0.1, 0).at(reached), None);
-    /// ```
-    pub fn at(self, reached: Reached) -> Option<Self> {
+    pub(crate) fn at(self, reached: Reached) -> Option<Self> {
         let Reached { ticks, level, .. } = reached;
         // The limit is far below an overflow of the ticks, and far above any number of steps.
         let possible = level <= self.max_halvings && ticks < 1 << 62 && ticks.is_multiple_of(TICKS >> level);
@@ -124,25 +97,12 @@ impl Clock {
     }
 
     /// The number of whole steps until `end`. A step that misses `end` by less than a millionth of a step has reached it.
-    ///
-    /// ```
-    /// use bfree::clock::Clock;
-    ///
-    /// // 0.3 / 0.1 is 2.9999999999999996.
-    /// assert_eq!((Clock::new(0.1, 0).whole_steps(0.3), Clock::new(0.1, 0).whole_steps(0.39)), (3, 3));
-    /// ```
-    pub fn whole_steps(&self, end: f64) -> u64 {
+    pub(crate) fn whole_steps(&self, end: f64) -> u64 {
         (end / self.nominal + TIME_TOLERANCE).floor().max(0.0) as u64
     }
 
     /// The time left to `end` after [`Self::whole_steps`], if `end` lies between steps.
-    ///
-    /// ```
-    /// use bfree::clock::Clock;
-    ///
-    /// assert_eq!((Clock::new(0.25, 0).rest(0.625), Clock::new(0.1, 0).rest(0.3)), (Some(0.125), None));
-    /// ```
-    pub fn rest(&self, end: f64) -> Option<f64> {
+    pub(crate) fn rest(&self, end: f64) -> Option<f64> {
         let rest = end - self.whole_steps(end) as f64 * self.nominal;
         (rest > TIME_TOLERANCE * self.nominal).then_some(rest)
     }
@@ -161,7 +121,7 @@ impl Clock {
     }
 
     /// A clock whose nominal step is the time left to `end`. This step is halved until it is no longer than the coming step. `None` if
-    /// `end` is reached, to the tolerance of [`Self::whole_steps`], or is more than a nominal step away.
+    /// `end` is reached, to within a millionth of a step, or is more than a nominal step away.
     ///
     /// ```
     /// use bfree::clock::Clock;
@@ -309,5 +269,22 @@ mod tests {
         let mut clock = Clock::new(1.0, 2);
         assert_eq!([clock.halve(), clock.halve(), clock.halve()], [true, true, false]);
         assert_eq!(clock.step(), 0.25);
+    }
+
+    #[test]
+    fn what_a_clock_has_reached_goes_through_a_file() -> Result<(), serde_json::Error> {
+        let mut clock = Clock::new(0.1, 2);
+        clock.advance();
+        clock.advance();
+        let read: Reached = serde_json::from_str(&serde_json::to_string(&clock.reached())?)?;
+        assert_eq!((read.steps(), Clock::new(0.1, 2).at(read)), (2, Some(clock)));
+        Ok(())
+    }
+
+    #[test]
+    fn whole_steps_and_the_rest_lead_to_the_end() {
+        // 0.3 / 0.1 is 2.9999999999999996.
+        assert_eq!([0.3, 0.39].map(|end| Clock::new(0.1, 0).whole_steps(end)), [3, 3]);
+        assert_eq!((Clock::new(0.25, 0).rest(0.625), Clock::new(0.1, 0).rest(0.3)), (Some(0.125), None));
     }
 }

@@ -144,6 +144,8 @@
 
 // First, because a macro is known only below its module.
 #[macro_use]
+mod dimensions;
+#[macro_use]
 mod mutant;
 
 pub mod aggregation;

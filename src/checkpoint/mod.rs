@@ -6,7 +6,7 @@
 //! added in `state.rs`.
 //!
 //! ```
-//! use bfree::checkpoint::{Checkpoints, Identity, forget, restore, unfinished};
+//! use bfree::checkpoint::{Checkpoints, Identity, restore, unfinished};
 //! use bfree::output::{Audience, OutputSettings, Recorder, Reference};
 //!
 //! let (folder, scene) = (tempfile::tempdir()?, bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?);
@@ -32,13 +32,11 @@
 //! assert_eq!(continued.clock.time(), 0.1);
 //! continued.advance()?;
 //! assert_eq!((&continued.particles, continued.clock), (&simulation.particles, simulation.clock));
-//! // A checkpoint can be written at any time, and all checkpoints can be removed.
+//! // A checkpoint can be written at any time.
 //! checkpoints.write(&simulation, &mut recorder)?;
 //! let mut last = start.clone();
 //! restore(&directory, &identity, &mut last)?;
 //! assert_eq!(last.clock, simulation.clock);
-//! forget(&directory)?;
-//! assert!(restore(&directory, &identity, &mut last).is_err());
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
@@ -154,12 +152,12 @@ pub enum CheckpointError {
         directory: PathBuf,
     },
     /// The directory has checkpoints, but none can be used.
-    #[error("no checkpoint in {} can be used: {}", directory.display(), list(unusable))]
+    #[error("no checkpoint in {} can be used: {}", directory.display(), unusable.join("; "))]
     NoneGood {
         /// The directory of the results.
         directory: PathBuf,
         /// All checkpoints, with reasons.
-        unusable: Vec<Unusable>,
+        unusable: Vec<String>,
     },
     /// The scene has changed.
     #[error(
@@ -186,20 +184,6 @@ pub enum CheckpointError {
         /// The quantity of the particles, or the key of the curve, that differs.
         array: String,
     },
-}
-
-/// A checkpoint that cannot be used.
-#[derive(Debug, thiserror::Error)]
-#[error("{}: {reason}", path.display())]
-pub struct Unusable {
-    /// The file.
-    pub path: PathBuf,
-    /// The reason.
-    pub reason: String,
-}
-
-fn list(unusable: &[Unusable]) -> String {
-    unusable.iter().map(Unusable::to_string).collect::<Vec<_>>().join("; ")
 }
 
 /// Writes the checkpoints of a run.
@@ -285,8 +269,8 @@ pub struct Restored {
     pub mark: Mark,
     /// Snapshots that were written before the checkpoint and are missing now.
     pub missing: Vec<PathBuf>,
-    /// Newer checkpoints and unreadable checkpoints, which could not be used.
-    pub unusable: Vec<Unusable>,
+    /// Newer checkpoints and unreadable checkpoints, which could not be used, with reasons.
+    pub unusable: Vec<String>,
     /// The program that wrote the checkpoint, if it was another version. The results may then differ in their bits.
     pub other_program: Option<String>,
 }
@@ -306,7 +290,7 @@ pub fn restore<const D: usize, L, A>(
         match read(&path) {
             Ok((content, arrays)) => candidates.push((slot, path, content, arrays)),
             Err(Damage::Io(error)) if error.kind() == ErrorKind::NotFound => {}
-            Err(damage) => unusable.push(Unusable { path, reason: damage.to_string() }),
+            Err(damage) => unusable.push(format!("{}: {damage}", path.display())),
         }
     }
     if candidates.is_empty() && unusable.is_empty() {
@@ -323,7 +307,7 @@ pub fn restore<const D: usize, L, A>(
                 let missing = mark.missing(directory);
                 return Ok(Restored { path, place: (slot, clock.steps()), mark, missing, unusable, other_program });
             }
-            Err(reason) => unusable.push(Unusable { path, reason }),
+            Err(reason) => unusable.push(format!("{}: {reason}", path.display())),
         }
     }
     Err(CheckpointError::NoneGood { directory: directory.to_owned(), unusable })
@@ -365,7 +349,7 @@ pub(crate) fn is_checkpoint(name: &str) -> bool {
 ///
 /// # Errors
 /// The operating system refuses.
-pub fn forget(directory: &Path) -> Result<(), CheckpointError> {
+pub(crate) fn forget(directory: &Path) -> Result<(), CheckpointError> {
     for path in NAMES.map(|name| directory.join(name)) {
         match std::fs::remove_file(&path) {
             Err(source) if !matches!(source.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => {

@@ -55,7 +55,7 @@ impl<U: Volumetric> Listed for NeoHookean<U> {
     type Parameters = LameParameters;
 
     fn build(given: &LameParameters, problems: &mut Problems, path: &str) -> Option<Self> {
-        given.lame(problems, path).map(Self::example)
+        given.lame(problems, path).map(|lame| Self { lame, volumetric: U::default() })
     }
 
     fn example(lame: Lame) -> Self {

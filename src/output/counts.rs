@@ -6,18 +6,6 @@ use crate::solver::NewtonHistory;
 use serde::{Deserialize, Serialize};
 
 /// Counts over all steps. Iterations, residuals and tangent products of failed attempts at a step are included.
-///
-/// ```
-/// use bfree::output::report::Counts;
-///
-/// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
-/// let mut simulation = scene.build::<2>("scenes".as_ref())?;
-/// let (mut counts, step) = (Counts::default(), simulation.advance()?);
-/// counts.add(&step);
-/// counts.add(&simulation.advance()?);
-/// assert_eq!((counts.steps, counts.max_active_nodes), (2, step.active_nodes));
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Counts {
@@ -60,7 +48,7 @@ pub struct Counts {
 
 impl Counts {
     /// Adds a step.
-    pub fn add<const D: usize>(&mut self, step: &StepReport<D>) {
+    pub(crate) fn add<const D: usize>(&mut self, step: &StepReport<D>) {
         let newton = &step.newton.history;
         self.max_active_nodes = self.max_active_nodes.max(step.active_nodes);
         self.steps += 1;
@@ -94,21 +82,6 @@ impl Counts {
 }
 
 /// Seconds of a run. Seconds of steps are summed over all steps.
-///
-/// ```
-/// use bfree::output::report::Seconds;
-///
-/// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
-/// let mut simulation = scene.build::<2>("scenes".as_ref())?;
-/// let (start, mut seconds) = (std::time::Instant::now(), Seconds::default());
-/// seconds.add(&simulation.step()?);
-/// seconds.add(&simulation.step()?);
-/// seconds.total = start.elapsed().as_secs_f64();
-/// // The named parts add up to the total.
-/// let sum: f64 = seconds.named().map(|(_, seconds)| seconds).sum();
-/// assert!((sum / seconds.total - 1.0).abs() < 1e-12);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Seconds {
@@ -126,7 +99,7 @@ pub struct Seconds {
 
 impl Seconds {
     /// Adds the phases of a step.
-    pub fn add<const D: usize>(&mut self, step: &StepReport<D>) {
+    pub(crate) fn add<const D: usize>(&mut self, step: &StepReport<D>) {
         self.add_phases(&step.seconds);
         self.add_failed(&step.failed);
     }
@@ -141,7 +114,7 @@ impl Seconds {
     }
 
     /// The set-up, the phases by name, the output, and `other`: the remaining seconds, such as those of checkpoints.
-    pub fn named(&self) -> impl Iterator<Item = (&'static str, f64)> + '_ {
+    pub(crate) fn named(&self) -> impl Iterator<Item = (&'static str, f64)> + '_ {
         let other = self.total - self.set_up - self.phases.iter().sum::<f64>() - self.output;
         let phases = Phase::ALL.iter().map(|phase| phase.1).zip(self.phases);
         std::iter::once(("set_up", self.set_up))
@@ -154,23 +127,38 @@ impl Seconds {
 mod tests {
     use super::*;
 
+    type Result = std::result::Result<(), Box<dyn std::error::Error>>;
+
     #[test]
-    fn a_failed_attempt_is_counted() -> Result<(), Box<dyn std::error::Error>> {
-        let mut simulation =
-            crate::scene::read_file("scenes/rebound.json".as_ref(), &[])?.build::<2>("scenes".as_ref())?;
-        let (newton, why) = (simulation.advance()?.newton.history, "no equilibrium was found".into());
-        let (residuals, seconds) = (newton.counts.residuals as u64, Stopwatch::start());
-        let mut counts = Counts::default();
-        counts.add_failed(&[FailedAttempt {
-            dt: 0.05,
-            inaccurate: false,
-            why,
-            projection_iterations: 7,
-            newton,
-            seconds,
-        }]);
-        assert_eq!((counts.steps, counts.failed_attempts, counts.projection_iterations), (0, 1, 7));
-        assert_eq!(counts.residual_evaluations, residuals);
+    fn a_failed_attempt_is_counted_beside_the_steps() -> Result {
+        let scene = crate::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+        let mut simulation = scene.build::<2>("scenes".as_ref())?;
+        let (mut counts, step) = (Counts::default(), simulation.advance()?);
+        counts.add(&step);
+        counts.add(&simulation.advance()?);
+        assert_eq!((counts.steps, counts.max_active_nodes), (2, step.active_nodes));
+        let newton = step.newton.history.clone();
+        let before = counts.residual_evaluations;
+        let (why, seconds) = ("no equilibrium was found".into(), Stopwatch::start());
+        let failed = FailedAttempt { dt: 0.05, inaccurate: false, why, projection_iterations: 7, newton, seconds };
+        counts.add_failed(&[failed]);
+        assert_eq!((counts.steps, counts.failed_attempts), (2, 1));
+        assert_eq!(counts.residual_evaluations, before + step.newton.history.counts.residuals as u64);
+        // The steps have none, because their mass is lumped.
+        assert_eq!(counts.projection_iterations, 7);
+        Ok(())
+    }
+
+    #[test]
+    fn the_named_seconds_add_up_to_the_total() -> Result {
+        let scene = crate::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+        let mut simulation = scene.build::<2>("scenes".as_ref())?;
+        let (start, mut seconds) = (std::time::Instant::now(), Seconds::default());
+        seconds.add(&simulation.step()?);
+        seconds.add(&simulation.step()?);
+        seconds.total = start.elapsed().as_secs_f64();
+        let sum: f64 = seconds.named().map(|(_, seconds)| seconds).sum();
+        assert!((sum / seconds.total - 1.0).abs() < 1e-12);
         Ok(())
     }
 }

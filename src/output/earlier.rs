@@ -47,22 +47,7 @@ pub(crate) fn role(name: &str) -> Option<Role> {
 }
 
 /// A file that a run would replace, in a directory without a history or report of this program.
-///
-/// ```
-/// use bfree::output::foreign;
-///
-/// let folder = tempfile::tempdir()?;
-/// let (history, picture) = (folder.path().join("history.csv"), folder.path().join("energies.png"));
-/// std::fs::write(folder.path().join("notes.txt"), "mine")?;
-/// assert_eq!(foreign(folder.path()), None);
-/// std::fs::write(&picture, "mine")?;
-/// assert_eq!(foreign(folder.path()), Some(picture));
-/// // A picture beside the history of a run may be replaced.
-/// std::fs::write(&history, "step,time,dt,kinetic\n")?;
-/// assert_eq!(foreign(folder.path()), None);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-pub fn foreign(directory: &Path) -> Option<PathBuf> {
+pub(crate) fn foreign(directory: &Path) -> Option<PathBuf> {
     let history = std::fs::read(directory.join(HISTORY)).ok();
     // The history of a run that died at once has no line.
     let is_history = |text: &[u8]| text.starts_with(START) || START.starts_with(text);
@@ -86,7 +71,7 @@ pub(crate) fn outcome(directory: &Path) -> Option<String> {
 
 /// The results of an earlier run.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Held {
+pub(crate) struct Held {
     /// Steps taken.
     pub steps: u64,
     /// Time reached.
@@ -96,20 +81,7 @@ pub struct Held {
 }
 
 /// The results in a directory that a new run there would replace. A run without a step has results only if it finished.
-///
-/// ```
-/// use bfree::output::{Held, held};
-///
-/// let folder = tempfile::tempdir()?;
-/// let history = folder.path().join("history.csv");
-/// std::fs::write(&history, "step,time,dt\n0,0,0\n")?;
-/// assert_eq!(held(folder.path()), None);
-/// // A killed run may leave a part of a line.
-/// std::fs::write(&history, "step,time,dt\n0,0,0\n1,0.5,0.5\n2,1")?;
-/// assert_eq!(held(folder.path()), Some(Held { steps: 1, time: 0.5, outcome: None }));
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-pub fn held(directory: &Path) -> Option<Held> {
+pub(crate) fn held(directory: &Path) -> Option<Held> {
     let (report, outcome) = (report(directory).unwrap_or_default(), outcome(directory));
     let reported = || Some((report["counts"]["steps"].as_u64()?, report["time"].as_f64()?));
     let (steps, time) = last_row(&directory.join(HISTORY)).or_else(reported)?;
@@ -145,4 +117,33 @@ pub(super) fn remove_later_files(directory: &Path, mark: Option<&Mark>) -> Resul
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_picture_is_foreign_unless_it_lies_beside_the_history_of_a_run() -> std::io::Result<()> {
+        let folder = tempfile::tempdir()?;
+        let (history, picture) = (folder.path().join("history.csv"), folder.path().join("energies.png"));
+        std::fs::write(folder.path().join("notes.txt"), "mine")?;
+        assert_eq!(foreign(folder.path()), None);
+        std::fs::write(&picture, "mine")?;
+        assert_eq!(foreign(folder.path()), Some(picture));
+        std::fs::write(&history, "step,time,dt,kinetic\n")?;
+        assert_eq!(foreign(folder.path()), None);
+        Ok(())
+    }
+
+    #[test]
+    fn the_last_whole_row_of_a_killed_run_says_how_far_it_came() -> std::io::Result<()> {
+        let folder = tempfile::tempdir()?;
+        let history = folder.path().join("history.csv");
+        std::fs::write(&history, "step,time,dt\n0,0,0\n")?;
+        assert_eq!(held(folder.path()), None);
+        std::fs::write(&history, "step,time,dt\n0,0,0\n1,0.5,0.5\n2,1")?;
+        assert_eq!(held(folder.path()), Some(Held { steps: 1, time: 0.5, outcome: None }));
+        Ok(())
+    }
 }

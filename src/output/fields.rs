@@ -3,8 +3,7 @@
 use super::{OutputError, Reference};
 use crate::field::Field;
 use crate::material::{
-    DISSIPATED, Law, MaterialState, NonPositiveJacobian, PLASTIC_STRAIN, first_piola, internal_variable,
-    internal_variable_names, out_of_plane_stress, principal_values,
+    DISSIPATED, Law, PLASTIC_STRAIN, internal_variable, internal_variable_names, out_of_plane_stress, principal_values,
 };
 use crate::simulation::Simulation;
 use crate::tensor::{SYMMETRIC, Tensor, Vector, embed, identity};
@@ -66,10 +65,13 @@ impl Field {
         let body = &simulation.bodies[particles.body[place] as usize];
         let law = &body.law;
         let averaged = || body.averaged(particles.dilatation(place), at().j);
-        let stress = || {
-            cauchy_stress(law, at())
-                .map(|stress| stress + Tensor::<f64, 3>::identity() * averaged()[1])
-                .map_err(|source| OutputError::Inadmissible { particle: id, source })
+        let stress = || -> Result<Tensor<f64, 3>, OutputError> {
+            let stress = simulation.cauchy_stress(place);
+            let mut stress = embed(&stress.map_err(|source| OutputError::Inadmissible { particle: id, source })?);
+            for i in D..3 {
+                stress[(i, i)] = out_of_plane_stress(law, &at()) + averaged()[1];
+            }
+            Ok(stress)
         };
         let symmetric = |tensor: Tensor<f64, 3>| SYMMETRIC.map(|component| tensor[component]);
         let rate =
@@ -140,20 +142,6 @@ impl Field {
 /// A vector with zeros for the missing components.
 pub(crate) fn padded<const D: usize>(v: &Vector<f64, D>) -> [f64; 3] {
     std::array::from_fn(|i| if i < D { v[i] } else { 0.0 })
-}
-
-/// σ = P Fᵀ / J with P = F S (eq. 7). In plane or uniaxial strain, the rest of the diagonal is the out-of-plane normal stress.
-fn cauchy_stress<const D: usize, L: Law>(
-    law: &L,
-    at: MaterialState<f64, D>,
-) -> Result<Tensor<f64, 3>, NonPositiveJacobian> {
-    let at = at.admissible()?;
-    let piola = first_piola(law, &at.f, &at);
-    let mut stress = embed(&(piola * at.f.transpose() / at.jacobian));
-    for i in D..3 {
-        stress[(i, i)] = out_of_plane_stress(law, &at);
-    }
-    Ok(stress)
 }
 
 /// Von Mises stress √(3/2 s:s) with the deviator s. Differences of the normal stresses make a pressure cancel exactly.

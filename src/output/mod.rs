@@ -14,13 +14,13 @@
 //! | `bodies.pvd`, `bodies_*.vtu` | the outlines of the bodies at the same times, in 2D, if all bodies are shapes that cut their cells |
 //! | `contacts.pvd`, `contacts_*.vtu` | pressure, traction and gap of every surface point at the same times, if bodies may touch anything |
 //! | `newton.jsonl` | Newton's method, one line per step; moved into `report.json` at the end, but also kept if there are checkpoints |
-//! | `particles.vtkhdf` | all snapshots of the particles in one file, by [`pack`]; so for the other series |
+//! | `particles.vtkhdf` | all snapshots of the particles in one file, by `bfree pack`; so for the other series |
 //! | `report.json` | settings, outcome, counts, seconds by phase, Newton and Krylov iterations and residuals of every step, warnings |
 //!
 //! [`plot::plot_run`] draws pictures of a directory, and a page with a player of the snapshots. Floats in text files have enough digits to
 //! give back the same bits.
 
-pub mod contact;
+mod contact;
 mod counts;
 mod csv;
 mod earlier;
@@ -40,17 +40,16 @@ mod progress;
 mod pvd;
 mod recorder;
 mod reference;
-pub mod report;
+mod report;
 pub(crate) mod snapshots;
 mod summary;
 mod surfaces;
-pub mod touched;
+mod touched;
 mod vtkhdf;
 pub mod vtu;
 pub mod warnings;
 
-pub use earlier::{Held, foreign, held};
-pub(crate) use earlier::{Role, outcome, role};
+pub(crate) use earlier::{Role, foreign, held, outcome, role};
 pub use error::OutputError;
 pub use mark::Mark;
 pub use probes::{Place, Probe, nearest};
@@ -59,4 +58,4 @@ pub use recorder::{OutputSettings, Recorder};
 pub use reference::Reference;
 pub use report::Outcome;
 pub use summary::Summary;
-pub use vtkhdf::pack;
+pub(crate) use vtkhdf::pack;

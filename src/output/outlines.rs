@@ -42,12 +42,13 @@ fn outline<const D: usize>(obstacle: &Obstacle<D>, grid: &Grid<D>) -> Vec<Vector
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mechanics::loads::ContactConstants;
     use crate::shape::{Ball, Block, HalfSpace, Mask, Pixels, Shape};
     use std::f64::consts::PI;
 
     fn corners<const D: usize>(shape: Shape<D>) -> Vec<Vector<f64, D>> {
         let grid = Grid { origin: Vector::zeros(), spacing: 0.1, cells: [10; D] };
-        outline(&Obstacle::new("one", shape, std::array::from_fn(|_| None), 1.0, 0.0), &grid)
+        outline(&Obstacle::new("one", shape, std::array::from_fn(|_| None), ContactConstants::default()), &grid)
     }
 
     fn length(corners: &[Vector<f64, 2>]) -> f64 {

@@ -22,17 +22,12 @@ const CHUNK: usize = 1 << 15;
 /// Writes `particles.vtkhdf` of the snapshots in the directory of a run, and a file of every other series beside it. `bodies` are the names
 /// of the bodies, which become those of the blocks. Returns the files written, and for each the snapshots in it and those that are missing.
 ///
-/// ```
-/// use bfree::output::{OutputError, pack};
-///
-/// let folder = tempfile::tempdir()?;
-/// assert!(matches!(pack(folder.path(), &[]), Err(OutputError::NoSnapshots(_))));
-/// # Ok::<(), std::io::Error>(())
-/// ```
-///
 /// # Errors
 /// There are no snapshots, a snapshot is damaged or has other fields than the first, or the operating system refuses.
-pub fn pack(directory: &Path, bodies: &[String]) -> std::result::Result<Vec<(PathBuf, [usize; 2])>, OutputError> {
+pub(crate) fn pack(
+    directory: &Path,
+    bodies: &[String],
+) -> std::result::Result<Vec<(PathBuf, [usize; 2])>, OutputError> {
     let mut written = Vec::new();
     for series in SERIES {
         let (files, missing): (Vec<_>, Vec<_>) =

@@ -1,7 +1,7 @@
 //! Snapshots as VTK's `.vtu`: an unstructured grid of vertices, segments or triangles, arrays appended raw in zlib blocks, little endian.
 //!
-//! Format: "VTK File Formats" of the VTK documentation. ParaView, pyvista and meshio read the files. [`Snapshot::read`] reads the files of
-//! [`Snapshot::write`] bit for bit.
+//! Format: "VTK File Formats" of the VTK documentation. ParaView, pyvista and meshio read the files. [`Snapshot::read`] gives the numbers
+//! that were written, bit for bit.
 
 use super::OutputError;
 use super::files::write_atomically;
@@ -81,24 +81,6 @@ impl Background {
 }
 
 /// Points with arrays, at one time.
-///
-/// ```
-/// use bfree::output::vtu::{Array, Background, Snapshot};
-///
-/// let speed = Array { name: "speed".into(), components: vec!["".into()], values: vec![0.1 + 0.2, -0.0], is_index: false };
-/// let snapshot = Snapshot {
-///     time: 1.0 / 3.0,
-///     background: Background { dimension: 1, origin: [0.0; 3], spacing: 0.5, cells: [4, 0, 0] },
-///     points: vec![[0.25, 0.0, 0.0], [1e-300, 0.0, 0.0]],
-///     arrays: vec![speed],
-///     corners: 1,
-/// };
-/// let folder = tempfile::tempdir()?;
-/// let path = folder.path().join("particles_0.vtu");
-/// snapshot.write(&path)?;
-/// assert_eq!(Snapshot::read(&path)?, snapshot);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Snapshot {
     /// Time.
@@ -168,7 +150,7 @@ impl Snapshot {
     ///
     /// # Errors
     /// The operating system refuses.
-    pub fn write(&self, path: &Path) -> Result<(), OutputError> {
+    pub(crate) fn write(&self, path: &Path) -> Result<(), OutputError> {
         let mut parts = Parts::default();
         parts.xml += "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" \
              header_type=\"UInt64\" compressor=\"vtkZLibDataCompressor\">\n<UnstructuredGrid>\n<FieldData>\n";
@@ -202,7 +184,7 @@ impl Snapshot {
         })
     }
 
-    /// Reads a file written by [`Self::write`].
+    /// Reads a file that this program has written.
     ///
     /// # Errors
     /// The operating system refuses, or the file is not a snapshot, or is damaged.

@@ -93,11 +93,7 @@ impl Newton {
     /// Takes the steps and prints their residuals.
     pub(crate) fn execute(&self) -> Result<(), Failure> {
         let scene = self.scene.read()?;
-        match scene.dimension() {
-            1 => self.execute_in::<1>(&scene),
-            2 => self.execute_in::<2>(&scene),
-            _ => self.execute_in::<3>(&scene),
-        }
+        in_dimensions!(scene.dimension(), D => self.execute_in::<D>(&scene))
     }
 
     fn execute_in<const D: usize>(&self, scene: &Scene) -> Result<(), Failure> {

@@ -108,11 +108,7 @@ impl Run {
         self.processes.get_or_init(|| processes.count());
         agreed(&processes, check_likeness(&processes))?;
         let scene = agreed(&processes, self.scene_of(&processes))?;
-        match scene.dimension() {
-            1 => self.execute_in::<1>(&scene, start, &processes),
-            2 => self.execute_in::<2>(&scene, start, &processes),
-            _ => self.execute_in::<3>(&scene, start, &processes),
-        }
+        in_dimensions!(scene.dimension(), D => self.execute_in::<D>(&scene, start, &processes))
     }
 
     /// Reads the scene, and sets the number of threads: by default one, if there are several processes.

@@ -94,11 +94,7 @@ impl SceneArguments {
     /// Runs `bfree check`: prints the particles, plan, output and probes of the scene.
     pub(crate) fn check(&self, gpu: bool, ranks: Option<u64>) -> Result<(), Failure> {
         let scene = self.read()?;
-        match scene.dimension() {
-            1 => self.check_in::<1>(&scene, gpu, ranks),
-            2 => self.check_in::<2>(&scene, gpu, ranks),
-            _ => self.check_in::<3>(&scene, gpu, ranks),
-        }
+        in_dimensions!(scene.dimension(), D => self.check_in::<D>(&scene, gpu, ranks))
     }
 
     fn check_in<const D: usize>(&self, scene: &Scene, gpu: bool, ranks: Option<u64>) -> Result<(), Failure> {

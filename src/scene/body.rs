@@ -3,7 +3,7 @@
 use super::default_number;
 use super::grid::GridBox;
 use super::shape::Shape;
-use crate::material::{self, Law};
+use crate::material::{self, Law, Material};
 use crate::particles::Dilatation;
 use crate::problems::{Number, Problems};
 use crate::shape::{EDGE, Fill, Layout};
@@ -55,6 +55,11 @@ pub struct ParticleFile {
 }
 
 impl Body {
+    /// The law, if its constants are allowed.
+    pub(super) fn law(&self) -> Option<Material> {
+        self.material.law(&mut Problems::default(), "")
+    }
+
     pub(super) fn check(&self, problems: &mut Problems, path: &str, grid: &GridBox) {
         let dimension = grid.dimension();
         let name = format!("{path}.name");

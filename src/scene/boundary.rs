@@ -1,6 +1,7 @@
 //! Boundary conditions at the faces of the box, and prescribed motion inside the box.
 
 use super::curve::{Curve, check_times};
+use super::free::Free;
 use super::shape::Shape;
 use super::vector::check_axis;
 use crate::problems::{Number, Problems};
@@ -98,75 +99,106 @@ pub struct Rotation {
     pub angle: Curve,
 }
 
-impl Face {
-    /// Whether the condition moves nodes.
-    pub(super) fn moves(&self) -> bool {
+/// A motion that a scene gives.
+#[derive(Clone, Copy)]
+pub(super) enum MotionOf<'a> {
+    Displacement(&'a Table),
+    Velocity(&'a Table),
+    Rotation(&'a Rotation),
+}
+
+impl<'a> MotionOf<'a> {
+    /// The motions that are given by the keys `displacement`, `velocity` and `rotation`.
+    pub(super) fn all(
+        displacement: &'a Option<Table>,
+        velocity: &'a Option<Table>,
+        rotation: &'a Option<Rotation>,
+    ) -> Vec<Self> {
+        let tables = displacement.iter().map(Self::Displacement).chain(velocity.iter().map(Self::Velocity));
+        tables.chain(rotation.iter().map(Self::Rotation)).collect()
+    }
+
+    fn key(self) -> &'static str {
+        match self {
+            Self::Displacement(_) => "displacement",
+            Self::Velocity(_) => "velocity",
+            Self::Rotation(_) => "rotation",
+        }
+    }
+
+    /// Whether the motion is not at rest throughout.
+    pub(super) fn moves(self) -> bool {
         match self {
             Self::Displacement(table) | Self::Velocity(table) => table.moves(),
             Self::Rotation(rotation) => rotation.angle.moves(),
-            Self::Free | Self::Sliding | Self::Fixed | Self::Held(_) => false,
         }
     }
 
     /// The curve of the motion, with its path.
-    pub(super) fn curve(&self, path: &str) -> Option<(String, &Curve)> {
+    pub(super) fn curve(self, path: &str) -> Option<(String, &'a Curve)> {
+        let path = format!("{path}.{}", self.key());
         match self {
-            Self::Displacement(table) => table.curve(&format!("{path}.displacement")),
-            Self::Velocity(table) => table.curve(&format!("{path}.velocity")),
-            Self::Rotation(rotation) => Some((format!("{path}.rotation.angle"), &rotation.angle)),
+            Self::Displacement(Table::Along(along)) | Self::Velocity(Table::Along(along)) => {
+                Some((format!("{path}.curve"), &along.curve))
+            }
+            Self::Displacement(Table::Rows(_)) | Self::Velocity(Table::Rows(_)) => None,
+            Self::Rotation(rotation) => Some((format!("{path}.angle"), &rotation.angle)),
+        }
+    }
+
+    fn check(self, problems: &mut Problems, path: &str, dimension: usize) {
+        let path = format!("{path}.{}", self.key());
+        match self {
+            Self::Displacement(table) => {
+                table.check(problems, &path, dimension);
+                table.check_start(problems, &path);
+            }
+            Self::Velocity(table) => table.check(problems, &path, dimension),
+            Self::Rotation(rotation) => rotation.check(problems, &path, dimension),
+        }
+    }
+}
+
+/// Checks motions, or the mass of a free obstacle, of which at most one may be given.
+pub(super) fn check_motions(
+    given: &[MotionOf<'_>],
+    free: Option<&Free>,
+    problems: &mut Problems,
+    path: &str,
+    dimension: usize,
+) {
+    given.iter().for_each(|motion| motion.check(problems, path, dimension));
+    if let Some(free) = free {
+        free.check(problems, &format!("{path}.free"), dimension);
+    }
+    let keys: Vec<_> = given.iter().map(|motion| motion.key()).chain(free.map(|_| "free")).collect();
+    problems.require(keys.len() < 2, path, keys.join(" and "), "give one of them");
+}
+
+impl Face {
+    /// The motion, if the nodes have one.
+    pub(super) fn given(&self) -> Option<MotionOf<'_>> {
+        match self {
+            Self::Displacement(table) => Some(MotionOf::Displacement(table)),
+            Self::Velocity(table) => Some(MotionOf::Velocity(table)),
+            Self::Rotation(rotation) => Some(MotionOf::Rotation(rotation)),
             Self::Free | Self::Sliding | Self::Fixed | Self::Held(_) => None,
         }
     }
 
-    /// The given motions, with their keys.
-    pub(super) fn motions(
-        [displacement, velocity]: [&Option<Table>; 2],
-        rotation: &Option<Rotation>,
-    ) -> Vec<(&'static str, Self)> {
-        let displacement = displacement.clone().map(|table| ("displacement", Self::Displacement(table)));
-        let velocity = velocity.clone().map(|table| ("velocity", Self::Velocity(table)));
-        let rotation = rotation.clone().map(|rotation| ("rotation", Self::Rotation(rotation)));
-        [displacement, velocity, rotation].into_iter().flatten().collect()
-    }
-
-    pub(super) fn check(&self, problems: &mut Problems, path: &str, dimension: usize) {
-        match self {
-            Self::Free | Self::Sliding | Self::Fixed => {}
-            Self::Held(held) => drop(problems.length(&format!("{path}.held"), held.len(), dimension)),
-            Self::Displacement(table) => {
-                let path = format!("{path}.displacement");
-                table.check(problems, &path, dimension);
-                table.check_start(problems, &path);
-            }
-            Self::Velocity(table) => table.check(problems, &format!("{path}.velocity"), dimension),
-            Self::Rotation(rotation) => rotation.check(problems, &format!("{path}.rotation"), dimension),
+    fn check(&self, problems: &mut Problems, path: &str, dimension: usize) {
+        if let Self::Held(held) = self {
+            problems.length(&format!("{path}.held"), held.len(), dimension);
+        }
+        if let Some(motion) = self.given() {
+            motion.check(problems, path, dimension);
         }
     }
 }
 
-/// The curves of motions with these keys, with their paths.
-pub(super) fn curves<'a>(
-    [displacement, velocity]: [&'a Option<Table>; 2],
-    rotation: &'a Option<Rotation>,
-    path: &str,
-) -> Vec<(String, &'a Curve)> {
-    let tables = [("displacement", displacement), ("velocity", velocity)].into_iter();
-    let tables = tables.filter_map(|(key, table)| table.as_ref()?.curve(&format!("{path}.{key}")));
-    tables.chain(rotation.iter().map(|one| (format!("{path}.rotation.angle"), &one.angle))).collect()
-}
-
 impl Boundary {
     /// The condition at the lower (`false`) or upper (`true`) face of an axis.
-    ///
-    /// ```
-    /// use bfree::scene::boundary::Face;
-    ///
-    /// // The cantilever is clamped at its left end, x = 0; what the scene does not mention is free.
-    /// let boundary = bfree::scene::read_file("scenes/cantilever.json".as_ref(), &[])?.boundary;
-    /// assert_eq!((boundary.face(0, false), boundary.face(1, true)), (&Face::Fixed, &Face::Free));
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    pub fn face(&self, axis: usize, upper: bool) -> &Face {
+    pub(super) fn face(&self, axis: usize, upper: bool) -> &Face {
         self.faces()[2 * axis + usize::from(upper)].1.unwrap_or(&Face::Free)
     }
 
@@ -195,20 +227,14 @@ impl Prescribed {
     pub(super) fn check(&self, problems: &mut Problems, path: &str, dimension: usize) {
         self.region.check(problems, &format!("{path}.region"), dimension);
         let given = self.given();
-        given.iter().for_each(|(_, motion)| motion.check(problems, path, dimension));
-        match given.as_slice() {
-            [_] => {}
-            [] => problems.refuse(path, "a region alone", "give its displacement, its velocity or its rotation"),
-            several => {
-                let keys: Vec<_> = several.iter().map(|(key, _)| *key).collect();
-                problems.refuse(path, keys.join(" and "), "give one of them");
-            }
-        }
+        check_motions(&given, None, problems, path, dimension);
+        let allowed = "give its displacement, its velocity or its rotation";
+        problems.require(!given.is_empty(), path, "a region alone", allowed);
     }
 
-    /// All given motions, with their keys; a checked scene has exactly one.
-    pub(super) fn given(&self) -> Vec<(&'static str, Face)> {
-        Face::motions([&self.displacement, &self.velocity], &self.rotation)
+    /// All given motions; a checked scene has exactly one.
+    pub(super) fn given(&self) -> Vec<MotionOf<'_>> {
+        MotionOf::all(&self.displacement, &self.velocity, &self.rotation)
     }
 }
 
@@ -236,12 +262,6 @@ impl Table {
             Self::Rows(rows) => rows.iter().flat_map(|row| row.1.iter().flatten()).any(|x| *x != 0.0),
             Self::Along(Along { direction, curve }) => direction.iter().flatten().any(|x| *x != 0.0) && curve.moves(),
         }
-    }
-
-    /// The curve along a direction, with its path.
-    fn curve(&self, path: &str) -> Option<(String, &Curve)> {
-        let Self::Along(along) = self else { return None };
-        Some((format!("{path}.curve"), &along.curve))
     }
 
     fn check(&self, problems: &mut Problems, path: &str, dimension: usize) {

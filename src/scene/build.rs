@@ -1,8 +1,9 @@
 //! Builds a simulation from a checked scene. Here and nowhere else, the dimension becomes a type: see [`Scene::dimension`].
 
-use super::boundary;
+use super::boundary::Prescribed;
 use super::curve::Curve;
 use super::filling::Builder;
+use super::obstacle::Obstacle;
 use super::transfer::Transfer;
 use super::vector::vector;
 use super::{BuildError, Problems, Scene, shape};
@@ -164,14 +165,13 @@ impl Scene {
         let loads = self.surface_loads();
         let loads = loads.filter_map(|(path, load)| Some((format!("{path}.curve"), load.curve.as_ref()?)));
         let faces = self.boundary.faces().into_iter();
-        let faces = faces.filter_map(|(name, face)| face?.curve(&format!("boundary.{name}")));
-        let prescribed = self.prescribed.iter().enumerate().flat_map(|(i, one)| {
-            boundary::curves([&one.displacement, &one.velocity], &one.rotation, &format!("prescribed[{i}]"))
-        });
-        let obstacles = self.obstacles.iter().enumerate().flat_map(|(i, one)| {
-            boundary::curves([&one.displacement, &one.velocity], &one.rotation, &format!("obstacles[{i}]"))
-        });
-        gravity.chain(loads).chain(faces).chain(prescribed).chain(obstacles).collect()
+        let faces = faces.filter_map(|(name, face)| face?.given()?.curve(&format!("boundary.{name}")));
+        let prescribed = self.prescribed.iter().map(Prescribed::given).enumerate();
+        let prescribed = prescribed.map(|(i, given)| (format!("prescribed[{i}]"), given));
+        let obstacles = self.obstacles.iter().map(Obstacle::given).enumerate();
+        let given = prescribed.chain(obstacles.map(|(i, given)| (format!("obstacles[{i}]"), given)));
+        let given = given.flat_map(|(path, given)| given.into_iter().filter_map(move |motion| motion.curve(&path)));
+        gravity.chain(loads).chain(faces).chain(given).collect()
     }
 
     fn settings(&self) -> Settings {
@@ -188,9 +188,9 @@ impl Scene {
             wall_update: self.time.wall_update.unwrap_or_default(),
             smoothing: match self.transfer.unwrap_or_default() {
                 Transfer::Flip => None,
-                Transfer::Pic(pic) => Some(Smoothing::uniform(pic.order, f64::INFINITY)),
-                Transfer::Blend(blend) => Some(Smoothing::uniform(blend.order, blend.rate)),
-                Transfer::Limited(limited) => Some(Smoothing::limited(limited.rate)),
+                Transfer::Pic { order } => Some(Smoothing::uniform(order, f64::INFINITY)),
+                Transfer::Blend { order, rate } => Some(Smoothing::uniform(order, rate)),
+                Transfer::Limited { rate } => Some(Smoothing::limited(rate)),
             },
             newton: NewtonSettings {
                 relative_tolerance: newton.tolerance,

@@ -3,6 +3,7 @@
 use super::Scene;
 use super::obstacle::check_law;
 use super::time::word;
+use crate::mechanics::loads::ContactConstants;
 use crate::mechanics::schemes::Parameters;
 use crate::problems::Problems;
 use schemars::JsonSchema;
@@ -47,6 +48,11 @@ impl Contact {
         problems.require(apart, "contact", "one group of bodies", allowed);
     }
 
+    /// The constants of the law, with the default of its stiffness.
+    pub(super) fn constants(&self, stiffness: f64) -> ContactConstants {
+        ContactConstants { stiffness: self.stiffness.unwrap_or(stiffness), friction: self.friction }
+    }
+
     /// The nodal field of each body, from 0 in the order of the bodies.
     pub(super) fn fields(&self, names: &[&str]) -> Vec<u32> {
         let group = |name: &str| self.groups.iter().position(|group| group.iter().any(|one| one == name));
@@ -64,6 +70,12 @@ impl Scene {
     /// Whether surfaces may touch an obstacle or another body.
     pub(super) fn has_contact(&self) -> bool {
         !self.obstacles.is_empty() || self.contact.is_some()
+    }
+
+    /// Whether friction acts at an obstacle or between bodies.
+    pub(super) fn has_friction(&self) -> bool {
+        let of_obstacles = self.obstacles.iter().map(|obstacle| obstacle.friction);
+        of_obstacles.chain(self.contact.iter().map(|contact| contact.friction)).any(|friction| friction > 0.0)
     }
 
     /// The nodal field of each body.

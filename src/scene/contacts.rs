@@ -2,6 +2,7 @@
 
 use super::BuildError;
 use super::body::Body;
+use super::boundary::Face;
 use super::filling::Builder;
 use super::free::surface;
 use super::load::{Loaded, Stress};
@@ -42,10 +43,10 @@ impl<const D: usize> Builder<'_, D> {
         let mut contacts = Contacts::default();
         for (i, one) in scene.obstacles.iter().enumerate() {
             let path = format!("obstacles[{i}]");
-            let (shape, motion) = (one.shape.built(&path)?, one.motion().motion(0)?);
+            let (shape, given) = (one.shape.built(&path)?, one.given());
+            let motion = given.first().map_or_else(|| Face::Fixed.motion(0), |given| given.motion())?;
             let free = one.free.as_ref().map(|free| free.build(&path, &shape, gravity)).transpose()?;
-            let obstacle =
-                Obstacle::new(one.name.clone(), shape, motion, one.stiffness.unwrap_or(stiffness), one.friction);
+            let obstacle = Obstacle::new(one.name.clone(), shape, motion, one.constants(stiffness));
             contacts.obstacles.push(Obstacle { free, ..obstacle });
         }
         if contacts.has_free_obstacle() {
@@ -59,8 +60,7 @@ impl<const D: usize> Builder<'_, D> {
                 let what = format!("{count} groups of bodies are too many for {cells} cells along the last axis");
                 return Err(BuildError::at("contact", what));
             }
-            contacts.between =
-                Some(BodyContact::new(contact.stiffness.unwrap_or(stiffness), contact.friction, &fields));
+            contacts.between = Some(BodyContact::new(contact.constants(stiffness), &fields));
         }
         if !contacts.exist() {
             return Ok(contacts);

@@ -1,7 +1,7 @@
 //! Factors as functions of time, or of a coordinate.
 
 use super::file::{FileError, open};
-use crate::mechanics::loads::{self, CurveError};
+use crate::mechanics::loads::{self, CurveError, Sine};
 use crate::problems::{Number, Problems};
 use crc32fast::hash;
 use schemars::JsonSchema;
@@ -32,21 +32,6 @@ pub enum OtherCurve {
     /// A text file beside the scene with rows `t, factor`: two columns, separated by a comma or white space. A first line that is not of
     /// numbers is a header.
     File(CurveFile),
-}
-
-/// mean + amplitude · sin(2π frequency t + phase)
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Sine {
-    /// The frequency (1/time), > 0.
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub frequency: f64,
-    /// The amplitude. Default: 1.
-    pub amplitude: Option<f64>,
-    /// The phase (radians). Default: 0.
-    pub phase: Option<f64>,
-    /// The mean. Default: 0.
-    pub mean: Option<f64>,
 }
 
 /// The file of a curve, relative to the scene's folder.
@@ -161,12 +146,7 @@ impl Curve {
         match self {
             Self::Rows(rows) => loads::Curve::new(rows.clone()),
             Self::Of(OtherCurve::File(file)) => loads::Curve::new(file.rows.get().cloned().unwrap_or_default()),
-            Self::Of(OtherCurve::Sine(Sine { frequency, amplitude, phase, mean })) => loads::Curve::sine(loads::Sine {
-                mean: mean.unwrap_or(0.0),
-                amplitude: amplitude.unwrap_or(1.0),
-                frequency: *frequency,
-                phase: phase.unwrap_or(0.0),
-            }),
+            Self::Of(OtherCurve::Sine(sine)) => loads::Curve::sine(*sine),
         }
     }
 }

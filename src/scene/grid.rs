@@ -36,45 +36,20 @@ pub struct GridBox {
     /// `{"strain": 0.3}` with `obstacles` or `contact`, and `{"strain": 0.1}` for a single body that a fixed face of the box holds from the
     /// start. Otherwise `"every_step"`.
     pub reset: Option<GridReset>,
-    /// Deprecated, and read for one release: the key is now `reset`. If `reset` is given, this key has no effect.
-    pub renewed: Option<GridReset>,
 }
 
 impl GridBox {
     /// The number of dimensions, 1 to 3 in a valid scene.
-    ///
-    /// Example: [`Self::build`].
-    pub fn dimension(&self) -> usize {
+    pub(super) fn dimension(&self) -> usize {
         self.size.len()
     }
 
     /// The lower corner, zeros if not given.
-    ///
-    /// Example: [`Self::build`].
-    pub fn origin(&self) -> Vec<f64> {
+    pub(super) fn origin(&self) -> Vec<f64> {
         self.origin.clone().unwrap_or_else(|| vec![0.0; self.size.len()])
     }
 
-    /// When the grid is reset, if that is given.
-    pub(super) fn given_reset(&self) -> Option<GridReset> {
-        self.reset.or(self.renewed)
-    }
-
     /// The grid; `None` unless the section is valid and of dimension `D`.
-    ///
-    /// ```
-    /// use bfree::scene::grid::GridBox;
-    ///
-    /// let section: GridBox = serde_json::from_str(r#"{"size": [2, 1], "spacing": 0.25}"#)?;
-    /// assert_eq!((section.dimension(), section.origin(), section.cells()), (2, vec![0.0, 0.0], Some(vec![8, 4])));
-    /// assert!(section.holds(&[2.0, 0.5]) && !section.holds(&[2.1, 0.5]));
-    /// let grid = section.build::<2>().ok_or("a plane grid")?;
-    /// assert_eq!(grid.position([8, 4]).as_slice(), section.size);
-    /// // Three quarters of a cell are not a whole number of cells.
-    /// let section: GridBox = serde_json::from_str(r#"{"size": [2, 1], "spacing": 0.8}"#)?;
-    /// assert_eq!((section.cells(), section.build::<2>()), (None, None));
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
     pub fn build<const D: usize>(&self) -> Option<Grid<D>> {
         let cells = self.cells()?.try_into().ok()?;
         let origin: [f64; D] = self.origin().try_into().ok()?;
@@ -82,16 +57,12 @@ impl GridBox {
     }
 
     /// Whether a point lies in the box or on its faces; false if the section is not valid.
-    ///
-    /// Example: [`Self::build`].
-    pub fn holds(&self, x: &[f64]) -> bool {
+    pub(super) fn holds(&self, x: &[f64]) -> bool {
         let edges = self.origin().into_iter().zip(&self.size);
         self.cells().is_some() && x.iter().zip(edges).all(|(x, (lower, size))| *x >= lower && *x <= lower + size)
     }
 
     /// The cells along each axis; `None` unless the section is valid.
-    ///
-    /// Example: [`Self::build`].
     pub fn cells(&self) -> Option<Vec<u32>> {
         let origin = self.origin();
         let sound =
@@ -115,10 +86,8 @@ impl GridBox {
     }
 
     pub(super) fn check(&self, problems: &mut Problems) {
-        for (key, given) in [("reset", self.reset), ("renewed", self.renewed)] {
-            if let Some(GridReset::Strain(most)) = given {
-                problems.positive(&format!("grid.{key}.strain"), most);
-            }
+        if let Some(GridReset::Strain(most)) = self.reset {
+            problems.positive("grid.reset.strain", most);
         }
         if !(1..=3).contains(&self.size.len()) {
             let found = format!("a vector of length {}", self.size.len());
@@ -150,5 +119,22 @@ impl GridBox {
             let far = sensible(x) && x.abs() > farthest;
             problems.require(!far, &format!("grid.origin[{k}]"), Number(x), &allowed);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_grid_fills_the_box_with_a_whole_number_of_cells() -> Result<(), Box<dyn std::error::Error>> {
+        let section: GridBox = serde_json::from_str(r#"{"size": [2, 1], "spacing": 0.25}"#)?;
+        assert_eq!((section.dimension(), section.origin(), section.cells()), (2, vec![0.0, 0.0], Some(vec![8, 4])));
+        assert!(section.holds(&[2.0, 0.5]) && !section.holds(&[2.1, 0.5]));
+        let grid = section.build::<2>().ok_or("a plane grid")?;
+        assert_eq!(grid.position([8, 4]).as_slice(), section.size);
+        let section: GridBox = serde_json::from_str(r#"{"size": [2, 1], "spacing": 0.8}"#)?;
+        assert_eq!((section.cells(), section.build::<2>()), (None, None));
+        Ok(())
     }
 }

@@ -1,6 +1,6 @@
 //! The loads of a scene: body forces, held faces and regions, loads on surfaces.
 
-use super::boundary::{Along, Face, Table};
+use super::boundary::{Along, Face, MotionOf, Table};
 use super::filling::Builder;
 use super::load::{Loaded, Pressure, Stress, Traction};
 use super::vector::vector;
@@ -51,7 +51,8 @@ impl<const D: usize> Builder<'_, D> {
         for (i, prescribed) in scene.prescribed.iter().enumerate() {
             let region = prescribed.region.of_nodes(&format!("prescribed[{i}].region"), &self.grid)?;
             // A checked scene gives one motion, and a region has no normal.
-            let motion = prescribed.given().first().map_or(&Face::Free, |(_, face)| face).motion(0)?;
+            let given = prescribed.given();
+            let motion = given.first().map_or_else(|| Face::Free.motion(0), |given| given.motion())?;
             loads.prescribed.push(Prescribed { name: format!("region{i}"), on: Selection::Region(region), motion });
         }
         for (path, load) in scene.surface_loads() {
@@ -112,12 +113,23 @@ impl<const D: usize> Builder<'_, D> {
 impl Face {
     /// The motion of each component, on a face normal to `axis`.
     pub(super) fn motion<const D: usize>(&self, axis: usize) -> Result<[Option<Motion<D>>; D], CurveError> {
-        let held = |holds: &dyn Fn(usize) -> bool| Ok(std::array::from_fn(|i| holds(i).then_some(Motion::Rest)));
+        if let Some(given) = self.given() {
+            return given.motion();
+        }
+        let holds = |i: usize| match self {
+            Self::Sliding => i == axis,
+            Self::Fixed => true,
+            Self::Held(components) => components.get(i) == Some(&true),
+            _ => false,
+        };
+        Ok(std::array::from_fn(|i| holds(i).then_some(Motion::Rest)))
+    }
+}
+
+impl MotionOf<'_> {
+    /// The motion of each component.
+    pub(super) fn motion<const D: usize>(self) -> Result<[Option<Motion<D>>; D], CurveError> {
         match self {
-            Self::Free => held(&|_| false),
-            Self::Sliding => held(&|i| i == axis),
-            Self::Fixed => held(&|_| true),
-            Self::Held(components) => held(&|i| components.get(i) == Some(&true)),
             Self::Displacement(table) => table.motion(Motion::Displacement),
             Self::Velocity(table) => table.motion(Motion::Velocity),
             Self::Rotation(rotation) => {

@@ -5,37 +5,38 @@
 //! the text is wrong, or all values that are not allowed.
 
 pub mod accuracy;
-pub mod body;
-pub mod boundary;
-pub mod contact;
-mod contacts;
-pub mod curve;
-mod free;
-pub mod grid;
-pub mod image_file;
 pub mod keys;
-pub mod load;
 pub mod mesh_file;
-pub mod obstacle;
-pub mod output;
 pub mod particle_file;
-pub mod shape;
-pub mod solver;
 pub mod surface_file;
-pub mod time;
-pub mod transfer;
 
+pub(crate) mod output;
+pub(crate) mod time;
+
+mod body;
+mod boundary;
 mod build;
 mod build_error;
+mod contact;
+mod contacts;
+mod curve;
 mod defaults;
 mod file;
 mod filling;
+mod free;
+mod grid;
+mod image_file;
 mod json;
+mod load;
 mod loading;
 mod msh;
+mod obstacle;
 mod overrides;
 mod place;
 mod read;
+mod shape;
+mod solver;
+mod transfer;
 mod vector;
 mod warnings;
 
@@ -105,10 +106,6 @@ pub struct Scene {
     /// Default: true without inertia, with a consistent mass (`time.lumping` 0), where the surface of a shape is loaded, with `obstacles` or
     /// `contact`, and in steps of constant length at Courant numbers above 10; else false.
     pub aggregation: Option<bool>,
-    /// Deprecated, and read for one release: aggregation has replaced the ghost stiffness. If `aggregation` is not given, 0 means false,
-    /// and a positive value means true.
-    #[schemars(range(min = 0, max = 1))]
-    pub ghost_stiffness: Option<f64>,
     /// The acceleration of gravity. Default: none.
     pub gravity: Option<load::Gravity>,
     /// Rayleigh damping, a M + b K. Default: none.
@@ -216,7 +213,6 @@ impl Scene {
         for (i, prescribed) in problems.few("prescribed", &self.prescribed).iter().enumerate() {
             prescribed.check(&mut problems, &format!("prescribed[{i}]"), dimension);
         }
-        problems.between("ghost_stiffness", self.ghost_stiffness, 0.0, 1.0);
         self.check_loads(&mut problems, dimension);
         if let Some(initial) = &self.initial_velocity {
             self.check_initial_velocity(initial, &mut problems, dimension);
@@ -237,20 +233,18 @@ impl Scene {
 
     /// The laws of all bodies whose constants are allowed.
     fn laws(&self) -> impl Iterator<Item = Material> {
-        self.bodies.iter().filter_map(|body| body.material.law(&mut Problems::default(), ""))
+        self.bodies.iter().filter_map(body::Body::law)
     }
 
     /// The parts of the scene that make the tangent unsymmetric.
     fn unsymmetric(&self) -> Unsymmetric {
-        let of_obstacles = self.obstacles.iter().map(|obstacle| obstacle.friction);
-        let mut frictions = of_obstacles.chain(self.contact.iter().map(|contact| contact.friction));
         Unsymmetric {
             path: self.time.scheme() == Parameters::ArcLength,
             mean_stress: self.time.scheme() == Parameters::EnergyMomentum,
             // A scene that asks for conjugate gradients gets the displacement form.
             mixed: false,
             pressure: !self.pressures.is_empty(),
-            friction: frictions.any(|friction| friction > 0.0),
+            friction: self.has_friction(),
             free_obstacle: self.obstacles.iter().any(|obstacle| obstacle.free.is_some()),
             law: self.laws().any(|law| !law.is_symmetric()),
         }
@@ -284,18 +278,18 @@ impl Scene {
             problems.refuse(&format!("pressures[{i}]"), "a follower pressure", allowed);
         }
         for (name, face) in self.boundary.faces() {
-            let moves = face.is_some_and(boundary::Face::moves);
+            let moves = face.and_then(boundary::Face::given).is_some_and(boundary::MotionOf::moves);
             problems.require(!moves, &format!("boundary.{name}"), "a motion", allowed);
         }
         for (i, prescribed) in self.prescribed.iter().enumerate() {
-            let moves = prescribed.given().iter().any(|(_, motion)| motion.moves());
+            let moves = prescribed.given().iter().any(|motion| motion.moves());
             problems.require(!moves, &format!("prescribed[{i}]"), "a motion", allowed);
         }
         for i in 0..self.obstacles.len() {
             problems.refuse(&format!("obstacles[{i}]"), "an obstacle", allowed);
         }
         problems.require(self.contact.is_none(), "contact", "contact between bodies", allowed);
-        let kept = self.grid.given_reset() != Some(GridReset::EveryStep);
+        let kept = self.grid.reset != Some(GridReset::EveryStep);
         problems.require(kept, "grid.reset", "\"every_step\"", allowed);
     }
 

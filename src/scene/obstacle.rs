@@ -1,8 +1,9 @@
 //! Rigid obstacles.
 
-use super::boundary::{Face, Rotation, Table};
+use super::boundary::{MotionOf, Rotation, Table, check_motions};
 use super::free::Free;
 use super::shape::Shape;
+use crate::mechanics::loads::ContactConstants;
 use crate::problems::Problems;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -58,14 +59,14 @@ pub(super) fn too_stiff(path: &str, stiffness: Option<f64>) -> Option<String> {
 }
 
 impl Obstacle {
-    /// The motion; at rest if none is given.
-    pub(super) fn motion(&self) -> Face {
-        self.given().into_iter().next().map_or(Face::Fixed, |(_, motion)| motion)
+    /// The constants of the law, with the default of its stiffness.
+    pub(super) fn constants(&self, stiffness: f64) -> ContactConstants {
+        ContactConstants { stiffness: self.stiffness.unwrap_or(stiffness), friction: self.friction }
     }
 
-    /// All given motions, with their keys; a checked scene has at most one.
-    fn given(&self) -> Vec<(&'static str, Face)> {
-        Face::motions([&self.displacement, &self.velocity], &self.rotation)
+    /// All given motions; a checked scene has at most one.
+    pub(super) fn given(&self) -> Vec<MotionOf<'_>> {
+        MotionOf::all(&self.displacement, &self.velocity, &self.rotation)
     }
 
     /// A warning about an obstacle that nothing can touch, or whose stiffness gains nothing.
@@ -91,12 +92,6 @@ impl Obstacle {
             problems.require(bounded || self.free.is_none(), &format!("{path}.shape"), "an unbounded shape", allowed);
         }
         check_law(problems, path, self.friction, self.stiffness, dimension);
-        let given = self.given();
-        given.iter().for_each(|(_, motion)| motion.check(problems, path, dimension));
-        if let Some(free) = &self.free {
-            free.check(problems, &format!("{path}.free"), dimension);
-        }
-        let keys: Vec<_> = given.iter().map(|(key, _)| *key).chain(self.free.iter().map(|_| "free")).collect();
-        problems.require(keys.len() < 2, path, keys.join(" and "), "give one of them");
+        check_motions(&self.given(), self.free.as_ref(), problems, path, dimension);
     }
 }

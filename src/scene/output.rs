@@ -95,7 +95,7 @@ impl Output {
 
     /// Refuses names that no law has. Without all laws, such as before a library is allowed, all names pass.
     fn check_internal_variables(&self, problems: &mut Problems, bodies: &[Body]) {
-        let laws = bodies.iter().map(|body| body.material.law(&mut Problems::default(), ""));
+        let laws = bodies.iter().map(Body::law);
         let Some(laws) = laws.collect::<Option<Vec<_>>>() else { return };
         let known = internal_variable_names(laws.iter());
         let allowed = match known.as_slice() {

@@ -55,16 +55,7 @@ impl FromStr for Override {
 
 impl Override {
     /// The argument of the command line.
-    ///
-    /// ```
-    /// use bfree::scene::Override;
-    ///
-    /// // A round trip: what was given can be given again.
-    /// let given: Override = "bodies.0.velocity=[1, 0]".parse()?;
-    /// assert_eq!(given.argument().parse::<Override>()?, given);
-    /// # Ok::<(), bfree::scene::OverrideError>(())
-    /// ```
-    pub fn argument(&self) -> &str {
+    pub(super) fn argument(&self) -> &str {
         &self.argument
     }
 

@@ -107,19 +107,6 @@ pub enum Shape {
 
 impl Shape {
     /// The geometry; `None` unless every vector has `D` components and [`Scene::check`](super::Scene::check) finds nothing wrong.
-    ///
-    /// ```
-    /// use bfree::scene::shape::Shape;
-    /// use bfree::tensor::Vector;
-    ///
-    /// let ring = r#"{"difference": {"of": {"ball": {"center": [0, 0], "radius": 2}}, "minus": {"ball": {"center": [0, 0], "radius": 1}}}}"#;
-    /// let ring: Shape = serde_json::from_str(ring)?;
-    /// let solid = ring.build::<2>().ok_or("plane")?;
-    /// assert_eq!(solid.signed_distance(&Vector::from([1.25, 0.0])), -0.25);
-    /// // A disc is no ball.
-    /// assert!(ring.build::<3>().is_none());
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
     pub fn build<const D: usize>(&self) -> Option<shape::Shape<D>> {
         self.checked(&mut Problems::default(), "")
     }
@@ -155,11 +142,7 @@ impl Shape {
     /// The corners of the bounding box; `None` if the shape is not allowed, with the reasons in `problems`, and while its file has not been
     /// read.
     pub(super) fn check(&self, problems: &mut Problems, path: &str, dimension: usize) -> Option<[Vec<f64>; 2]> {
-        match dimension {
-            1 => self.checked::<1>(problems, path).map(bounds),
-            2 => self.checked::<2>(problems, path).map(bounds),
-            _ => self.checked::<3>(problems, path).map(bounds),
-        }
+        in_dimensions!(dimension, D => self.checked::<D>(problems, path).map(bounds))
     }
 
     /// The geometry; `None` if it is not allowed, with the reasons in `problems`, and while its file has not been read.
@@ -350,4 +333,19 @@ fn surface<const D: usize>(file: &SurfaceFile, problems: &mut Problems, path: &s
 fn has_few(parts: &[Shape], problems: &mut Problems, path: &str) -> bool {
     problems.require(!parts.is_empty(), path, "an empty list", "must have at least one shape");
     !problems.few(path, parts).is_empty()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ring_is_a_plane_shape() -> Result<(), Box<dyn std::error::Error>> {
+        let [whole, hole] = [2, 1].map(|radius| format!(r#"{{"ball": {{"center": [0, 0], "radius": {radius}}}}}"#));
+        let ring: Shape = serde_json::from_str(&format!(r#"{{"difference": {{"of": {whole}, "minus": {hole}}}}}"#))?;
+        let solid = ring.build::<2>().ok_or("plane")?;
+        assert_eq!(solid.signed_distance(&Vector::from([1.25, 0.0])), -0.25);
+        assert!(ring.build::<3>().is_none());
+        Ok(())
+    }
 }

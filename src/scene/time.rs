@@ -25,8 +25,6 @@ pub struct Time {
     /// The time integration scheme: dynamics or statics. Without inertia there are load steps: each ends in static equilibrium under the
     /// loads at its end. Keys of velocities or the mass matrix are then refused. Default: `"newmark"`.
     pub scheme: Option<schemes::Parameters>,
-    /// Deprecated, and read for one release: the key is now `scheme`. If `scheme` is given, this key has no effect.
-    pub inertia: Option<schemes::Parameters>,
     /// Newmark's β (no unit), > 0, with 2β ≥ γ; for `"newmark"` only. Default 0.25, the trapezoidal rule.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub beta: Option<f64>,
@@ -66,36 +64,12 @@ pub struct Adaptive {
 
 impl Time {
     /// The time integration scheme.
-    ///
-    /// ```
-    /// use bfree::mechanics::schemes::Parameters;
-    /// use bfree::scene::time::Time;
-    ///
-    /// // The old key `inertia` is read, unless the new key `scheme` is given.
-    /// let scheme = |text: &str| serde_json::from_str(text).map(|time: Time| time.scheme());
-    /// assert_eq!(scheme(r#"{"step": 0.1, "end": 1}"#)?, Parameters::Newmark);
-    /// assert_eq!(scheme(r#"{"step": 0.1, "end": 1, "inertia": "none"}"#)?, Parameters::None);
-    /// assert_eq!(scheme(r#"{"step": 0.1, "end": 1, "scheme": "arc_length", "inertia": "none"}"#)?, Parameters::ArcLength);
-    /// # Ok::<(), serde_json::Error>(())
-    /// ```
-    pub fn scheme(&self) -> schemes::Parameters {
-        self.scheme.or(self.inertia).unwrap_or_default()
+    pub(super) fn scheme(&self) -> schemes::Parameters {
+        self.scheme.unwrap_or_default()
     }
 
     /// Newmark's β and γ.
-    ///
-    /// ```
-    /// use bfree::mechanics::schemes::Newmark;
-    /// use bfree::scene::time::Time;
-    ///
-    /// // A scene that says nothing of them gets the trapezoidal rule.
-    /// let time: Time = serde_json::from_str(r#"{"step": 0.1, "end": 1}"#)?;
-    /// assert_eq!(time.newmark(), Newmark::default());
-    /// let time: Time = serde_json::from_str(r#"{"step": 0.1, "end": 1, "beta": 0.3, "gamma": 0.6}"#)?;
-    /// assert_eq!(time.newmark(), Newmark { beta: 0.3, gamma: 0.6 });
-    /// # Ok::<(), serde_json::Error>(())
-    /// ```
-    pub fn newmark(&self) -> Newmark {
+    pub(super) fn newmark(&self) -> Newmark {
         let default = Newmark::default();
         Newmark { beta: self.beta.unwrap_or(default.beta), gamma: self.gamma.unwrap_or(default.gamma) }
     }

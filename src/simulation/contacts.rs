@@ -7,7 +7,7 @@ use crate::material::Law;
 use crate::mechanics::contact::{
     Carrier, ContactPoint, FreeMotion, Surroundings, Touching, candidates, obstacle_points,
 };
-use crate::mechanics::loads::{Candidate, Contacts, Obstacle, PointInContact, Pose, RigidBody, SurfacePoint};
+use crate::mechanics::loads::{Candidate, Contacts, Obstacle, PointInContact, Pose, RigidBody};
 use crate::mechanics::schemes::Alphas;
 use crate::mechanics::sweep::Supports;
 use crate::mechanics::terms::{ContactForce, Step, penalties};
@@ -134,12 +134,12 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let contacts = &self.loads.contacts;
         let since = |work, friction_loss| ContactForces { work, friction_loss, ..ContactForces::NONE };
         let pairs = contacts.between.iter().flat_map(|between| &between.pairs);
-        let anchors = contacts.obstacles.iter().zip(&motion.poses[1]);
+        let anchors = |(one, pose): (&Obstacle<D>, _)| one.anchors_at(pose, &contacts.points, &motion.positions);
         ContactUpdate {
             obstacles: contacts.obstacles.iter().map(|one| since(one.work, one.friction_loss)).collect(),
             taken: [vec![0.0; contacts.obstacles.len()], vec![0.0; pairs.clone().count()]],
             pairs: pairs.map(|pair| since(0.0, pair.friction_loss)).collect(),
-            anchors: anchors.map(|(one, pose)| free_anchors(one, pose, &contacts.points, &motion.positions)).collect(),
+            anchors: contacts.obstacles.iter().zip(&motion.poses[1]).map(anchors).collect(),
             ..ContactUpdate::default()
         }
     }
@@ -310,17 +310,6 @@ fn points_at<const D: usize, L: Law>(
 ) -> Vec<ContactPoint<f64, D>> {
     let step = Step { poses: Some(poses), ..*step };
     ContactForce::of(&step).map_or_else(Vec::new, |force| force.contact_points(phi))
-}
-
-/// The anchors of points that touch nothing: their positions.
-fn free_anchors<const D: usize>(
-    obstacle: &Obstacle<D>,
-    pose: &Pose<D>,
-    points: &[SurfacePoint<D>],
-    positions: &[Vector<f64, D>],
-) -> Vec<Vector<f64, D>> {
-    let at = |point: &SurfacePoint<D>| pose.to_frame(&positions[point.particle]);
-    if obstacle.friction > 0.0 { points.iter().map(at).collect() } else { Vec::new() }
 }
 
 /// The place that moments on an obstacle are about, in its frame: the centre of mass of a free obstacle, else the middle of its bounding box,

@@ -28,7 +28,7 @@ pub use touching::SharedNodes;
 use crate::approximation::{Approximation, ShapeFunction};
 use crate::clock::Clock;
 use crate::grid::Grid;
-use crate::material::{DISSIPATED, Law, Material, internal_variable};
+use crate::material::{DISSIPATED, Law, Material, NonPositiveJacobian, first_piola, internal_variable};
 use crate::mechanics::loads::{Loads, PrescribedDof};
 use crate::mechanics::path::Path;
 use crate::mechanics::schemes::Alphas;
@@ -39,7 +39,7 @@ use crate::parallel::{self, PART};
 use crate::particles::{Body, Particles};
 use crate::pooled::Pool;
 use crate::solver::Krylov;
-use crate::tensor::Vector;
+use crate::tensor::{Tensor, Vector, identity};
 
 /// An implicit material point simulation in `D` dimensions.
 ///
@@ -199,6 +199,16 @@ impl<const D: usize, L: Law, A> Simulation<D, L, A> {
             particles.volume[p] * internal_variable(law, &particles.state(p, 0.0), DISSIPATED).unwrap_or(0.0)
         };
         (0..particles.len()).map(lost).sum()
+    }
+
+    /// The Cauchy stress σ = P Fᵀ / J with P = F S (eq. 7), in the plane or along the line of the scene, of the particle at `place`.
+    pub(crate) fn cauchy_stress(&self, place: usize) -> Result<Tensor<f64, D>, NonPositiveJacobian> {
+        let particles = &self.particles;
+        let body = &self.bodies[particles.body[place] as usize];
+        let at = particles.state(place, 0.0).admissible()?;
+        let stress = first_piola(&body.law, &at.f, &at) * at.f.transpose() / at.jacobian;
+        let [_, mean] = body.averaged(particles.dilatation(place), at.j);
+        Ok(stress + identity::<f64, D>() * mean)
     }
 
     /// Whether the stress in the balance of forces is the mean stress of the step.

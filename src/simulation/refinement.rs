@@ -61,10 +61,11 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             let f = identity::<f64, D>() + particles.displacement_gradient[particle];
             let normal = f.tr_mul(&Vector::from_column_slice(outward)).normalize();
             let area = particles.volume[particle].powf((D - 1) as f64 / D as f64);
-            contacts.cover(*id, SurfacePoint::new(particle, normal, area));
-            for obstacle in contacts.obstacles.iter_mut().filter(|obstacle| obstacle.friction > 0.0) {
+            let point = SurfacePoint::new(particle, normal, area);
+            contacts.cover(*id, point);
+            for obstacle in &mut contacts.obstacles {
                 let pose = obstacle.pose(self.clock.time());
-                obstacle.anchors.push(pose.to_frame(&particles.position[particle]));
+                obstacle.anchors.extend(obstacle.anchors_at(&pose, &[point], &particles.position));
             }
         }
         contacts.points.len() > before

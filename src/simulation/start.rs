@@ -115,22 +115,9 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
 
     /// The nodal state, projected from the particles. Without inertia it holds at most the mass, and that for gravity alone.
     ///
-    /// ```
-    /// use bfree::mechanics::sweep::Supports;
-    /// use bfree::tensor::Vector;
-    ///
-    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
-    /// let simulation = scene.build::<2>("scenes".as_ref())?;
-    /// let (supports, _) = Supports::new(&simulation.approximation, &simulation.grid, &simulation.particles.position)?;
-    /// let nodal = simulation.project(&supports)?;
-    /// let momentum: Vector<f64, 2> = nodal.mass.iter().zip(&nodal.velocity).map(|(&m, v)| v * m).sum();
-    /// assert!((momentum - simulation.particles.momentum()).norm() < 1e-13);
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    ///
     /// # Errors
     /// Particle velocities so large that the projection overflows.
-    pub fn project(&self, supports: &Supports<D>) -> Result<Nodal<D>, LinearError> {
+    pub(crate) fn project(&self, supports: &Supports<D>) -> Result<Nodal<D>, LinearError> {
         if self.settings.scheme.has_inertia() {
             return match self.settings.projection {
                 Projection::Mass => Nodal::project(&self.particles, supports, self.settings.lumping),

@@ -2,9 +2,9 @@
 
 use super::Simulation;
 use crate::approximation::ShapeFunction;
-use crate::material::{Law, first_piola, p_wave_modulus};
+use crate::material::{Law, p_wave_modulus};
 use crate::mechanics::sweep::Supports;
-use crate::tensor::{Tensor, Vector};
+use crate::tensor::Vector;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 /// Particles with |N| below this value do not contribute to a node.
@@ -139,7 +139,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let n = Some(across).filter(|across| across.norm() > ENCLOSED * h)?.normalize();
         let (mut volume, mut normal, mut squares) = (0.0, 0.0, 0.0);
         for &p in sides.iter().flatten() {
-            let stress = self.cauchy_stress(p)?;
+            let stress = self.cauchy_stress(p).ok()?;
             volume += particles.volume[p];
             normal += particles.volume[p] * n.dot(&(stress * n));
             squares += particles.volume[p] * stress.norm_squared();
@@ -148,15 +148,5 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let softer = bodies.map(|body| p_wave_modulus(&self.bodies[body as usize].law));
         let some = NO_STRAIN * softer[0].min(softer[1]);
         Some(normal).filter(|&normal| normal > TENSION * mean && normal > some)
-    }
-
-    /// The Cauchy stress σ in the plane or along the line of the scene; `None` where det F ≤ 0.
-    fn cauchy_stress(&self, p: usize) -> Option<Tensor<f64, D>> {
-        let particles = &self.particles;
-        let body = &self.bodies[particles.body[p] as usize];
-        let at = particles.state(p, 0.0).admissible().ok()?;
-        let stress = first_piola(&body.law, &at.f, &at) * at.f.transpose() / at.jacobian;
-        let [_, mean] = body.averaged(particles.dilatation(p), at.j);
-        Some(stress + Tensor::<f64, D>::identity() * mean)
     }
 }

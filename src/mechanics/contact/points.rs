@@ -1,7 +1,7 @@
 //! The points of surfaces that touch an obstacle or another body.
 
 use super::law::{ContactLaw, Ends};
-use crate::mechanics::loads::{BodyContact, Candidate, Contacts, Pose, Share, SurfacePoint};
+use crate::mechanics::loads::{BodyContact, Candidate, ContactConstants, Contacts, Pose, Share, SurfacePoint};
 use crate::mechanics::sweep::Supports;
 use crate::scalar::Real;
 use crate::shape::Feature;
@@ -118,13 +118,9 @@ fn obstacle_point<T: Real, const D: usize>(
     if here.is_nan() || here.min(deepest) >= 0.0 {
         return None;
     }
-    let law = ContactLaw {
-        feature: obstacle.shape.feature(&at),
-        stiffness: obstacle.stiffness * stiffness(particle),
-        friction: obstacle.friction,
-        anchor: obstacle.anchors.get(number).copied().unwrap_or(at),
-        mean,
-    };
+    let ContactConstants { stiffness, friction } = obstacle.constants.scaled(stiffness(particle));
+    let anchor = obstacle.anchors.get(number).copied().unwrap_or(at);
+    let law = ContactLaw { feature: obstacle.shape.feature(&at), stiffness, friction, anchor, mean };
     let carriers = vec![Carrier::at(particle)];
     Some(ContactPoint { touching: Touching::Obstacle(index), number, area, carriers, pose: *pose, law, y })
 }
@@ -170,8 +166,8 @@ fn pair_point<T: Real, const D: usize>(
     // The slip is y − a along the surface.
     let anchor = one.start - one.slip;
     mutant!("contact: bodies forget their slip": anchor = one.start);
-    let stiffness = between.stiffness * own.min(other);
-    let law = ContactLaw { feature, stiffness, friction: between.friction, anchor, mean: None };
+    let ContactConstants { stiffness, friction } = between.constants.scaled(own.min(other));
+    let law = ContactLaw { feature, stiffness, friction, anchor, mean: None };
     Some(ContactPoint {
         touching: Touching::Pair { pair: one.pair, is_first: one.is_first, candidate },
         number: one.number,

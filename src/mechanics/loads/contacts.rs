@@ -1,6 +1,6 @@
 //! The contacts of the bodies: with rigid obstacles, and with each other.
 
-use super::{Obstacle, SurfacePoint};
+use super::{ContactConstants, Obstacle, SurfacePoint};
 use crate::tensor::Vector;
 use std::collections::BTreeMap;
 
@@ -23,10 +23,8 @@ pub struct Contacts<const D: usize> {
 /// with Coulomb friction.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BodyContact<const D: usize> {
-    /// The penalty stiffness (pressure per depth) in units of min(Λ + 2G, 4G)/h of the softer body, > 0.
-    pub stiffness: f64,
-    /// The coefficient of friction μ, ≥ 0.
-    pub friction: f64,
+    /// The constants of the law of contact.
+    pub constants: ContactConstants,
     /// The pairs of bodies of different fields.
     pub pairs: Vec<Pair>,
     /// The energy stored in the contact at t_n.
@@ -129,8 +127,8 @@ impl<const D: usize> Contacts<D> {
 
     /// Whether friction acts anywhere.
     pub(crate) fn have_friction(&self) -> bool {
-        let between = self.between.iter().map(|between| between.friction);
-        self.obstacles.iter().map(|obstacle| obstacle.friction).chain(between).any(|friction| friction > 0.0)
+        let between = self.between.iter().map(|between| &between.constants);
+        self.obstacles.iter().map(|obstacle| &obstacle.constants).chain(between).any(ContactConstants::has_friction)
     }
 
     /// The energy dissipated by friction since the start.
@@ -156,9 +154,8 @@ impl<const D: usize> Contacts<D> {
 
     /// Puts the anchors of friction to the points of surfaces at `positions` at time `t`, and the slip between bodies to zero.
     pub(crate) fn anchor(&mut self, positions: &[Vector<f64, D>], t: f64) {
-        for obstacle in self.obstacles.iter_mut().filter(|obstacle| obstacle.friction > 0.0) {
-            let pose = obstacle.pose(t);
-            obstacle.anchors = self.points.iter().map(|point| pose.to_frame(&positions[point.particle])).collect();
+        for obstacle in &mut self.obstacles {
+            obstacle.anchors = obstacle.anchors_at(&obstacle.pose(t), &self.points, positions);
         }
         if let Some(between) = &mut self.between {
             between.slips.clear();
@@ -168,12 +165,12 @@ impl<const D: usize> Contacts<D> {
 
 impl<const D: usize> BodyContact<D> {
     /// Contact between bodies with these nodal fields.
-    pub fn new(stiffness: f64, friction: f64, fields: &[u32]) -> Self {
+    pub fn new(constants: ContactConstants, fields: &[u32]) -> Self {
         let bodies = || 0..fields.len();
         let all = bodies().flat_map(|one| (one + 1..fields.len()).map(move |other| [one, other]));
         let apart = all.filter(|&[one, other]| fields[one] != fields[other]);
         let pairs = apart.map(|pair| Pair { bodies: pair.map(|body| body as u32), friction_loss: 0.0 }).collect();
-        Self { stiffness, friction, pairs, ..Self::default() }
+        Self { constants, pairs, ..Self::default() }
     }
 
     /// The elastic slip of a point on the other body of a pair at t_n.

@@ -18,7 +18,7 @@ pub use contacts::{BodyContact, Candidate, Contacts, Pair, Share};
 pub use curve::{Curve, CurveError, Sine};
 pub use force_field::{Field, ForceField};
 pub use motion_step::MotionStep;
-pub use obstacle::Obstacle;
+pub use obstacle::{ContactConstants, Obstacle};
 pub use pose::Pose;
 pub use prescribed::{Motion, Prescribed, PrescribedDof, Reaction, Selection, prescribed_dofs};
 pub use rayleigh::Rayleigh;

@@ -1,10 +1,31 @@
 //! Rigid obstacles that bodies touch: their shape, their motion, and the state of their friction.
 
 use super::prescribed::Motion;
-use super::{Pose, RigidBody};
+use super::{Pose, RigidBody, SurfacePoint};
 use crate::grid::Grid;
 use crate::shape::Shape;
 use crate::tensor::{Vector, identity};
+
+/// The constants of the law of contact.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ContactConstants {
+    /// The penalty stiffness (pressure per depth) in units of min(Λ + 2G, 4G)/h of the body, or of the softer one of two, > 0.
+    pub stiffness: f64,
+    /// The coefficient of friction μ, ≥ 0.
+    pub friction: f64,
+}
+
+impl ContactConstants {
+    /// Whether friction acts.
+    pub(crate) fn has_friction(&self) -> bool {
+        self.friction > 0.0
+    }
+
+    /// The constants with the stiffness in another unit, one of which is `unit` of these.
+    pub(crate) fn scaled(&self, unit: f64) -> Self {
+        Self { stiffness: self.stiffness * unit, ..*self }
+    }
+}
 
 /// A rigid obstacle. Bodies touch it without adhesion, with Coulomb friction.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,10 +40,8 @@ pub struct Obstacle<const D: usize> {
     pub free: Option<RigidBody<D>>,
     /// Points of the surface, in the frame of the obstacle, where obstacles move freely. There obstacles must not meet.
     pub surface: Vec<Vector<f64, D>>,
-    /// The penalty stiffness (pressure per depth) in units of min(Λ + 2G, 4G)/h of the body, > 0.
-    pub stiffness: f64,
-    /// The coefficient of friction μ, ≥ 0.
-    pub friction: f64,
+    /// The constants of the law of contact.
+    pub constants: ContactConstants,
     /// The anchors of friction at t_n, one for each of [`Contacts::points`](super::Contacts::points), in the frame of the obstacle. The elastic slip of a point is
     /// its distance from its anchor along the surface. Empty without friction.
     pub anchors: Vec<Vector<f64, D>>,
@@ -36,7 +55,7 @@ impl<const D: usize> Obstacle<D> {
     /// The rigid motion up to time `t`. A free obstacle has its pose at t_n.
     ///
     /// ```
-    /// use bfree::mechanics::loads::{Curve, Motion, Obstacle, Rotation};
+    /// use bfree::mechanics::loads::{ContactConstants, Curve, Motion, Obstacle, Rotation};
     /// use bfree::shape::Ball;
     /// use bfree::tensor::Vector;
     ///
@@ -44,7 +63,7 @@ impl<const D: usize> Obstacle<D> {
     /// let quarter = Curve::new(vec![[0.0, 0.0], [1.0, std::f64::consts::FRAC_PI_2]])?;
     /// let turn = Motion::Rotation(Rotation::new(Vector::from([1.0, 0.0]), [0.0, 0.0, 1.0], quarter));
     /// let disc = Ball { center: Vector::from([3.0, 0.0]), radius: 1.0 }.into();
-    /// let obstacle = Obstacle::new("disc", disc, [Some(turn.clone()), Some(turn)], 1.0, 0.0);
+    /// let obstacle = Obstacle::new("disc", disc, [Some(turn.clone()), Some(turn)], ContactConstants::default());
     /// let center = obstacle.pose(1.0).to_space(&Vector::from([3.0, 0.0]));
     /// assert!((center - Vector::from([1.0, 2.0])).norm() < 1e-15);
     /// # Ok::<(), bfree::mechanics::loads::CurveError>(())
@@ -72,13 +91,28 @@ impl<const D: usize> Obstacle<D> {
         name: impl Into<String>,
         shape: Shape<D>,
         motion: [Option<Motion<D>>; D],
-        stiffness: f64,
-        friction: f64,
+        constants: ContactConstants,
     ) -> Self {
         let name = name.into();
         let (surface, anchors) = (Vec::new(), Vec::new());
         let (work, friction_loss) = (0.0, 0.0);
-        Self { name, shape, motion, free: None, surface, stiffness, friction, anchors, work, friction_loss }
+        Self { name, shape, motion, free: None, surface, constants, anchors, work, friction_loss }
+    }
+
+    /// Whether friction acts on what slides on the obstacle.
+    pub(crate) fn slides(&self) -> bool {
+        self.constants.has_friction()
+    }
+
+    /// The anchors of points that touch nothing: their positions, in the frame of an obstacle at `pose`. None without friction.
+    pub(crate) fn anchors_at(
+        &self,
+        pose: &Pose<D>,
+        points: &[SurfacePoint<D>],
+        positions: &[Vector<f64, D>],
+    ) -> Vec<Vector<f64, D>> {
+        let anchored = if self.slides() { points } else { &[] };
+        anchored.iter().map(|point| pose.to_frame(&positions[point.particle])).collect()
     }
 
     /// Whether a free obstacle lies outside the grid: a ball about its centre of mass that holds its bounding box.

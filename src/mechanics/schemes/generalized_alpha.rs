@@ -40,7 +40,7 @@ impl GeneralizedAlpha {
     }
 
     /// Newmark's relations between Δφ, v and a, with β and γ of this scheme.
-    pub fn newmark(&self) -> Newmark {
+    fn newmark(&self) -> Newmark {
         let (inertia, force) = self.weights();
         let shift = inertia - force;
         Newmark { beta: 0.25 * (1.0 + shift) * (1.0 + shift), gamma: 0.5 + shift }

@@ -150,10 +150,8 @@ impl Alphas {
     }
 
     /// v − v_n and a − a_n, from Δφ, v_n and a_n.
-    ///
-    /// Example: [`Newmark::alphas`].
     #[inline(always)]
-    pub fn increments<const D: usize>(
+    pub(crate) fn increments<const D: usize>(
         &self,
         dphi: &Vector<f64, D>,
         v: &Vector<f64, D>,

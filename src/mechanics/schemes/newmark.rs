@@ -21,18 +21,6 @@ impl Default for Newmark {
 
 impl Newmark {
     /// The α-parameters of a step of length `dt`.
-    ///
-    /// ```
-    /// use bfree::mechanics::schemes::Newmark;
-    /// use bfree::tensor::Vector;
-    ///
-    /// // Uniformly accelerated motion, Δφ = v Δt + ½ a Δt², is exact for every β and γ.
-    /// let (v, a, dt) = (Vector::from([3.0]), Vector::from([-2.0]), 0.25);
-    /// let alphas = Newmark { beta: 0.3025, gamma: 0.6 }.alphas(dt);
-    /// let dphi = v * dt + a * (0.5 * dt * dt);
-    /// let (delta_v, delta_a) = alphas.increments(&dphi, &v, &a);
-    /// assert!((delta_v - a * dt).norm() < 1e-14 && delta_a.norm() < 1e-13);
-    /// ```
     pub fn alphas(&self, dt: f64) -> Alphas {
         let Self { beta, gamma } = *self;
         mutant!("schemes: 1 for γ": gamma = 1.0);

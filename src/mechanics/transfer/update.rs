@@ -55,7 +55,6 @@ pub struct Committed {
 /// let alphas = simulation.settings.scheme.end(dt);
 /// let mut update = Update::new(&alphas, &nodal, &nodal, &[], WallUpdate::Literal, &dphi);
 /// update.smooth(&Smoothing::limited(40.0), &particles, &supports, &nodal.mass, dt);
-/// assert!(update.impulses().is_empty()); // no walls
 /// assert_eq!(update.leaving(&particles, &supports, &simulation.grid), None);
 /// update.commit(&mut particles, &simulation.bodies, &supports, dt);
 /// let flown = particles.position[7] - simulation.particles.position[7] - particles.velocity[7] * dt;
@@ -226,7 +225,7 @@ impl<'a, const D: usize> Update<'a, D> {
 
     /// m_I (Δv − Δv_Newmark) at every prescribed degree of freedom. A wall gives this momentum, beyond the reactions, to nodes that do not
     /// move with the wall yet.
-    pub fn impulses(&self) -> &[f64] {
+    pub(crate) fn impulses(&self) -> &[f64] {
         &self.impulses
     }
 

@@ -25,7 +25,6 @@ mod table;
 mod view;
 
 pub(crate) use convergence::newton_norms;
-pub use picture::Picture;
 pub use view::View;
 
 use super::OutputError;
@@ -39,7 +38,7 @@ use chart::{Heading, Line, Panel};
 use colouring::Colouring;
 use histories::ROUND_OFF;
 use particles::Surfaces;
-use picture::Color;
+use picture::{Color, Picture};
 use player::Recording;
 use run_report::{has_inertia, quantity, title};
 use serde_json::Value;

@@ -98,7 +98,7 @@ impl Picture {
     }
 
     /// The content of an SVG file.
-    pub fn svg(&self) -> String {
+    pub(crate) fn svg(&self) -> String {
         let ((width, height), body) = (self.size, listed(&self.elements));
         format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width:.0}\" height=\"{height:.0}\" viewBox=\"0 0 {width:.0} {height:.0}\" \

@@ -13,7 +13,7 @@ impl Picture {
     ///
     /// # Errors
     /// The picture has no pixels, or more than fit into memory.
-    pub fn png(&self, name: &'static str) -> Result<Vec<u8>, OutputError> {
+    pub(crate) fn png(&self, name: &'static str) -> Result<Vec<u8>, OutputError> {
         let fail = |reason: String| OutputError::Draw { name, reason };
         let (width, height) = self.size;
         let pixels = |length: f64| (length.round() as f32 * SCALE) as u32;

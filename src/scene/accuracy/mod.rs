@@ -135,11 +135,9 @@ pub(super) fn set_keys(scene: &mut Value) -> Result<Vec<Chosen>, Problems> {
     Ok(setter.chosen)
 }
 
-/// Whether the scene asks for load steps, by the key `time.scheme` or by its old name.
+/// Whether the scene asks for load steps.
 fn has_load_steps(scene: &Value) -> bool {
-    let time = &scene["time"];
-    let scheme = if time["scheme"].is_null() { &time["inertia"] } else { &time["scheme"] };
-    scheme == "none"
+    scene["time"]["scheme"] == "none"
 }
 
 /// A part of a scene; `None` if it does not have the type `T`.

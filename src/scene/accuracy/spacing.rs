@@ -68,8 +68,7 @@ pub(super) fn fitting(grid: &GridBox, bodies: &[Body], cells: f64) -> Result<f64
 pub(super) fn speed(bodies: &[Body]) -> Result<f64, String> {
     let mut greatest = None;
     for body in bodies {
-        let law = body.material.law(&mut Problems::default(), "material");
-        let speed = law.map_or(f64::NAN, |law| (p_wave_modulus(&law) / body.density).sqrt());
+        let speed = body.law().map_or(f64::NAN, |law| (p_wave_modulus(&law) / body.density).sqrt());
         if !(speed > 0.0 && speed.is_finite()) {
             return Err(format!("the constants or the density of the body {:?} give no speed of sound", body.name));
         }

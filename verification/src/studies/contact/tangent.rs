@@ -9,7 +9,9 @@ use crate::studies::StudyError;
 use crate::studies::tangent::{SPACING, cloud};
 use bfree::approximation::{Approximation, Bspline};
 use bfree::material::{Lame, Material, NeoHookean};
-use bfree::mechanics::loads::{BodyContact, Candidate, Curve, Motion, Obstacle, RigidBody, Rotation, Share};
+use bfree::mechanics::loads::{
+    BodyContact, Candidate, ContactConstants, Curve, Motion, Obstacle, RigidBody, Rotation, Share,
+};
 use bfree::shape::{Ball, Block, Cone, HalfSpace, Shape};
 use bfree::simulation::Simulation;
 use bfree::tensor::{Tensor, Vector};
@@ -60,7 +62,8 @@ fn dimension<const D: usize>(report: &mut Report) -> Result<(), StudyError> {
             // In 1D there is no direction to slip.
             for (name, friction, slip) in STATES.into_iter().take(if D == 1 { 1 } else { STATES.len() }) {
                 let motion = std::array::from_fn(|_| turned.then(|| turning(middle)));
-                let mut obstacle = Obstacle::new("obstacle", solid.clone(), motion, 1.0, friction);
+                let mut obstacle =
+                    Obstacle::new("obstacle", solid.clone(), motion, ContactConstants { stiffness: 1.0, friction });
                 if way == "free" {
                     obstacle.free = Some(free(&simulation, middle, &mut random));
                 }
@@ -109,7 +112,7 @@ fn between<const D: usize>(
 ) -> BodyContact<D> {
     let points = &simulation.loads.contacts.points;
     let x = |number: usize| simulation.particles.position[points[number].particle];
-    let mut between = BodyContact::new(1.0, friction, &[0, 1]);
+    let mut between = BodyContact::new(ContactConstants { stiffness: 1.0, friction }, &[0, 1]);
     for number in 0..points.len() {
         let normal = random.vector::<D>().normalize();
         let start = normal * (-0.05 * SPACING);
