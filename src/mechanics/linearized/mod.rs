@@ -24,8 +24,8 @@ use crate::mechanics::mass::Mass;
 use crate::mechanics::sweep::{At, Group, Mode, Quadratic, Supports};
 use crate::tensor::{Tensor, Vector, identity, scaled};
 
-/// A linearised step.
-#[derive(Debug)]
+/// A linearised step. By default it is that of no term.
+#[derive(Debug, Default)]
 pub(crate) struct Linearized<const D: usize> {
     /// α, the factor of M̃.
     pub mass: f64,
@@ -55,17 +55,6 @@ pub(crate) type PressureChanges = Vec<Vec<f64>>;
 pub(crate) type FunctionsAt<'a, const D: usize> = dyn Fn(usize) -> Vec<(usize, Function<D>)> + 'a;
 
 impl<const D: usize> Linearized<D> {
-    /// The linearisation of no term.
-    pub(crate) fn zero() -> Self {
-        Self {
-            mass: 0.0,
-            stresses: Vec::new(),
-            cells: Vec::new(),
-            pressures: PressureRows::default(),
-            contacts: ContactRows::default(),
-        }
-    }
-
     /// `out += K u`
     pub(crate) fn add_product(
         &self,

@@ -28,7 +28,7 @@ pub(crate) struct Damping<'a, const D: usize, L> {
 impl<'a, const D: usize, L: Law> Damping<'a, D, L> {
     pub(super) fn of(step: &Step<'a, D, L>) -> Option<Self> {
         let Rayleigh { mass, stiffness } = step.loads.damping.filter(|_| !step.nodal.is_static())?;
-        let (mut viscosity, mut failure) = (Linearized { mass, ..Linearized::zero() }, None);
+        let (mut viscosity, mut failure) = (Linearized { mass, ..Linearized::default() }, None);
         if stiffness > 0.0 {
             match Self::stiffness(step) {
                 Ok(rows) => viscosity.stresses.push(rows.times(stiffness)),

@@ -185,7 +185,7 @@ impl<'a, const D: usize, L: Law> Terms<'a, D, L> {
     /// Linearises all terms, or one piece.
     pub(crate) fn linearize(&self, piece: Option<Piece>, at: Trial<'_, f64, D>) -> Result<Linearized<D>, Inadmissible> {
         let part = piece.map_or(Part::Whole, |piece| piece.part);
-        let mut linearized = Linearized::zero();
+        let mut linearized = Linearized::default();
         for any in self.picked(|name, _| piece.is_none_or(|piece| piece.term == name)) {
             of_term!(any, term => term.linearize(at, part, &mut linearized))?;
         }

@@ -68,6 +68,7 @@ pub struct Committed {
 /// assert!(whole.position.iter().zip(&particles.position).all(|(a, b)| (a - b).norm() < 1e-12));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
+#[derive(Default)]
 pub struct Update<'a, const D: usize> {
     dphi: &'a [Vector<f64, D>],
     /// φ = φ_n + Δφ; `None` right after a grid reset.
@@ -129,20 +130,7 @@ impl<'a, const D: usize> Update<'a, D> {
             kept = Some(nodal.motion.pool().collect(sums));
             mutant!("transfer: the end of a step forgets the motion on a kept grid": { kept = Some(nodal.motion.pool().collect(dphi.iter().copied())); });
         }
-        let (dilatation, smoothed, memory) = (Vec::new(), None, None);
-        let (moved, gradients) = (OnceCell::new(), OnceCell::new());
-        Self {
-            dphi,
-            kept,
-            dilatation,
-            delta_velocity,
-            delta_acceleration,
-            impulses,
-            smoothed,
-            memory,
-            moved,
-            gradients,
-        }
+        Self { dphi, kept, delta_velocity, delta_acceleration, impulses, ..Self::default() }
     }
 
     /// The update with dilatations of averaged cells that are unknowns of their own.
