@@ -57,7 +57,7 @@ impl<const D: usize> Mass<'_, D> {
         self.add_lumped(factor, u, out);
         if self.lumping < 1.0 {
             mutant!("mass: the product takes ε for 1 − ε": factor = factor * self.lumping / (1.0 - self.lumping));
-            self.supports.accumulate(Some(u), Mode::VALUE, out, |group, at, sums| {
+            self.supports.sweep(Some(u), Mode::VALUE, out, |group, at, sums| {
                 self.add_consistent(factor, group, at, sums);
             });
         }

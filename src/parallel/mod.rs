@@ -214,8 +214,7 @@ impl<E> First<E> {
     where
         E: Message,
     {
-        let own = self.here();
-        let all = if E::NEVER { vec![own] } else { processes.told(&own) };
+        let all = processes.told(&self.here());
         all.into_iter().flatten().min_by_key(|(number, _)| *number)
     }
 

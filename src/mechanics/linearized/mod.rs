@@ -66,7 +66,7 @@ impl<const D: usize> Linearized<D> {
         self.add_product_at_nodes(mass, u, out);
         let Some(mode) = self.mode(mass) else { return };
         let changes = self.pressure_changes(mass.supports, Along::Field(u, pressures));
-        mass.supports.accumulate(Some(u), mode, out, |group, at, sums| {
+        mass.supports.sweep(Some(u), mode, out, |group, at, sums| {
             self.add_product_of_group(mass, &changes, group, at, sums);
         });
     }

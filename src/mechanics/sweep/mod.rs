@@ -26,7 +26,6 @@
 //!
 //! Threads are used here and in the vectors of the space.
 
-mod at_particle;
 mod block;
 mod blocks;
 mod builder;
@@ -49,7 +48,6 @@ mod shares;
 mod supports;
 mod tiled;
 
-pub use at_particle::AtParticle;
 pub use blocks::Quadratic;
 pub(crate) use blocks::pair;
 pub(crate) use columns::WIDEST;

@@ -3,54 +3,31 @@
 use super::group::At;
 use super::supports::{Implementation, dispatch};
 use super::tiled::Tiled;
-use super::{AtParticle, Group, Mode, Number, Quadratic, Supports, Weights};
+use super::{Group, Mode, Number, Quadratic, Supports, Weights};
 use crate::lanes::LANES;
 use crate::parallel::{First, Message};
 use crate::pooled::{Element, Pooled};
 use crate::tensor::{Tensor, Vector};
-use std::convert::Infallible;
 
 impl<const D: usize> Supports<D> {
     /// `f_I += Σ_p q N_I + σ ∇_r N_I` for C components: 1 or D. `point(group, u and L, q and σ)` adds to q and σ, which begin with
     /// zero. Without a field u and L are unspecified.
-    ///
-    /// # Errors
-    /// An error of `point` carries a number. The error with the smallest number is returned, and `out` is then unspecified.
-    pub fn sweep<T: Number, const C: usize, E: Send + Message>(
-        &self,
-        field: Option<&[Vector<T, C>]>,
-        mode: Mode,
-        out: &mut [Vector<T, C>],
-        point: impl Fn(Group<'_>, &At<T, C, D>, &mut At<T, C, D>) -> Result<(), (usize, E)> + Sync,
-    ) -> Result<(), E> {
-        const { assert!(C == 1 || C == D) };
-        self.pass();
-        let failure = First::none();
-        let point = |group: Group<'_>, fields: &[At<f64, C, D>], sums: &mut [At<f64, C, D>]| {
-            if let Err((number, error)) = T::at(fields, sums, |at, sums| point(group, at, sums)) {
-                failure.keep(number, error);
-            }
-        };
-        let field = field.map(T::flat);
-        T::add_flat(out, |out| {
-            dispatch!(self, one => one.sweep::<C>(T::FIELDS, field.as_deref(), mode, out, &point));
-        });
-        failure.check(self.processes())
-    }
-
-    /// [`Self::sweep`] of a function that always has a value, such as a product with a tangent.
-    pub(crate) fn accumulate<T: Number, const C: usize>(
+    pub fn sweep<T: Number, const C: usize>(
         &self,
         field: Option<&[Vector<T, C>]>,
         mode: Mode,
         out: &mut [Vector<T, C>],
         point: impl Fn(Group<'_>, &At<T, C, D>, &mut At<T, C, D>) + Sync,
     ) {
-        let point = |group: Group<'_>, at: &_, sums: &mut _| -> Result<(), (usize, Infallible)> {
-            point(group, at, sums);
-            Ok(())
+        const { assert!(C == 1 || C == D) };
+        self.pass();
+        let point = |group: Group<'_>, fields: &[At<f64, C, D>], sums: &mut [At<f64, C, D>]| {
+            T::at(fields, sums, |at, sums| point(group, at, sums));
         };
-        let Ok(()) = self.sweep(field, mode, out, point);
+        let field = field.map(T::flat);
+        T::add_flat(out, |out| {
+            dispatch!(self, one => one.sweep::<C>(T::FIELDS, field.as_deref(), mode, out, &point));
+        });
     }
 
     /// Calls `fill(group, L, rows)` for every group of this process. Each of them has `count` rows.
@@ -91,9 +68,8 @@ impl<const D: usize> Supports<D> {
     /// ∇u_p = Σ u_I ⊗ ∇_r N_I. The scatter has the given weights in place of N and ∇_r N.
     ///
     /// ```
-    /// use bfree::mechanics::{check::direction, sweep::{Supports, Weights}};
+    /// use bfree::mechanics::{check::direction, residual::Inadmissible, sweep::{Supports, Weights}};
     /// use bfree::tensor::{Tensor, Vector, contract};
-    /// use std::convert::Infallible;
     ///
     /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
     /// let simulation = scene.build::<2>("scenes".as_ref())?;
@@ -103,17 +79,17 @@ impl<const D: usize> Supports<D> {
     /// let (u, w) = (direction::<2>(nodes.len(), 1), direction::<2>(nodes.len(), 2));
     /// let state = |u: Vector<f64, 2>, gradient: Tensor<f64, 2>| (u * 3.0, gradient * 2.0);
     /// let mut force = vec![Vector::zeros(); nodes.len()];
-    /// supports.assemble(&u, Weights::Signed, &mut force, |_, u, gradient| Ok::<_, Infallible>(state(u, gradient)))?;
+    /// supports.assemble(&u, Weights::Signed, &mut force, |_, u, gradient| Ok::<_, Inadmissible>(state(u, gradient)))?;
     /// let at_nodes: f64 = force.iter().zip(&w).map(|(f, w)| f.dot(w)).sum();
-    /// let states = supports.interpolate(&u, |_, u, gradient| Ok::<_, Infallible>(state(u, gradient)))?;
+    /// let states = supports.interpolate(&u, |_, u, gradient| Ok::<_, Inadmissible>(state(u, gradient)))?;
     /// let work = supports.interpolate(&w, |p, w, gradient| {
     ///     let (q, sigma) = states[p];
-    ///     Ok::<_, Infallible>(contract(&sigma, &gradient) + q.dot(&w))
+    ///     Ok::<_, Inadmissible>(contract(&sigma, &gradient) + q.dot(&w))
     /// })?;
     /// assert!((at_nodes - work.iter().sum::<f64>()).abs() < 1e-10);
     ///
     /// // A uniform pressure acts on the rim of a body. Inside, the forces of the particles around a node cancel, but their sizes do not.
-    /// let pressure = |_: usize, _: Vector<f64, 2>, _: Tensor<f64, 2>| Ok::<_, Infallible>((Vector::zeros(), Tensor::identity()));
+    /// let pressure = |_: usize, _: Vector<f64, 2>, _: Tensor<f64, 2>| Ok::<_, Inadmissible>((Vector::zeros(), Tensor::identity()));
     /// let (mut force, mut size) = (vec![Vector::zeros(); nodes.len()], vec![Vector::zeros(); nodes.len()]);
     /// supports.assemble(&u, Weights::Signed, &mut force, pressure)?;
     /// supports.assemble(&u, Weights::Magnitude, &mut size, pressure)?;
@@ -133,7 +109,7 @@ impl<const D: usize> Supports<D> {
         point: impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> Result<(Vector<T, D>, Tensor<T, D>), E> + Sync,
     ) -> Result<(), E> {
         let failure = First::none();
-        self.accumulate(Some(field), Mode { weights, ..Mode::BOTH }, out, |group, at, sums| {
+        self.sweep(Some(field), Mode { weights, ..Mode::BOTH }, out, |group, at, sums| {
             for (lane, &p) in group.particles.iter().enumerate() {
                 let (value, gradient) = at.lane(lane);
                 match point(p as usize, value, gradient) {
@@ -166,7 +142,7 @@ impl<const D: usize> Supports<D> {
         out: &mut [Vector<f64, C>],
         value: impl Fn(usize) -> Vector<f64, C> + Sync,
     ) {
-        self.accumulate(None, Mode { weights, ..Mode::VALUE }, out, |group, _, sums| {
+        self.sweep(None, Mode { weights, ..Mode::VALUE }, out, |group, _, sums| {
             for (lane, &p) in group.particles.iter().enumerate() {
                 let value = value(p as usize);
                 (0..C).for_each(|c| sums.value[c][lane] = value[c]);
@@ -228,7 +204,7 @@ impl<const D: usize> Supports<D> {
     /// assert!(divergence.iter().all(|one| one.abs() < 1e-12));
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn evaluate<T: Number, R: AtParticle>(
+    pub fn evaluate<T: Number, R: Copy + Send + Message>(
         &self,
         field: &[Vector<T, D>],
         point: impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> R + Sync,
@@ -238,7 +214,7 @@ impl<const D: usize> Supports<D> {
             let gradient = Tensor::from_fn(|c, k| T::from_fields(|i| fields[i].gradient[c][k][lane]));
             point(p, value, gradient)
         };
-        let mut results = vec![R::blank(); self.particles()];
+        let mut results = vec![R::unknown(); self.particles()];
         self.at_own_particles(T::FIELDS, &T::flat(field), Mode::BOTH, &mut results[self.own_places()], point);
         self.in_memory_order(&mut results, Tiled::share_at_particles);
         results
@@ -276,7 +252,7 @@ impl<const D: usize> Supports<D> {
     ///
     /// # Errors
     /// The error of the first particle in memory whose `point` fails.
-    pub fn interpolate<T: Number, R: AtParticle, E: Send + Message>(
+    pub fn interpolate<T: Number, R: Copy + Send + Message, E: Send + Message>(
         &self,
         field: &[Vector<T, D>],
         point: impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> Result<R, E> + Sync,
@@ -285,7 +261,7 @@ impl<const D: usize> Supports<D> {
         let results = self.evaluate(field, |p, value, gradient| {
             point(p, value, gradient).unwrap_or_else(|error| {
                 failure.keep(p, error);
-                R::blank()
+                R::unknown()
             })
         });
         failure.check(self.processes())?;
