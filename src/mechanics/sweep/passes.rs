@@ -3,11 +3,13 @@
 use super::group::At;
 use super::supports::{Implementation, dispatch};
 use super::tiled::Tiled;
-use super::{Group, Mode, Number, Quadratic, Supports, Weights};
+use super::{Each, Group, Mode, Number, Quadratic, Supports, Weights};
 use crate::lanes::LANES;
 use crate::parallel::{First, Message};
 use crate::pooled::{Element, Pooled};
 use crate::tensor::{Tensor, Vector};
+use bytemuck::Pod;
+use num_traits::Zero;
 
 impl<const D: usize> Supports<D> {
     /// `f_I += Σ_p q N_I + σ ∇_r N_I` for C components: 1 or D. `point(group, u and L, q and σ)` adds to q and σ, which begin with
@@ -38,8 +40,8 @@ impl<const D: usize> Supports<D> {
         rows: &mut [[f64; LANES]],
         fill: impl Fn(Group<'_>, &At<f64, D, D>, &mut [[f64; LANES]]) + Sync,
     ) {
-        self.pass();
-        dispatch!(self, one => one.fill_rows(bytemuck::cast_slice(field), count, rows, &fill));
+        let fill = |group: Group<'_>, at: &[At<f64, D, D>], rows: &mut [[f64; LANES]]| fill(group, &at[0], rows);
+        self.results(Each::Group(count), 1, Some(bytemuck::cast_slice(field)), Mode::GRADIENT, rows, fill);
     }
 
     /// [`Self::fill_rows`] for the groups of all processes.
@@ -52,9 +54,21 @@ impl<const D: usize> Supports<D> {
     ) {
         let own = self.own_groups();
         self.fill_rows(field, count, &mut rows[own.start * count..own.end * count], fill);
-        if let Implementation::Tiled(tiled) = &self.implementation {
-            tiled.share_rows(count, rows);
+        if let Some(tiled) = self.tiled() {
+            tiled.share_numbers(Each::Group(count), LANES, rows.as_flattened_mut());
         }
+    }
+
+    /// `evaluate(group)` of all groups, in the order of their numbers.
+    pub(crate) fn map_groups<R: Clone + Send + Message>(&self, evaluate: impl Fn(Group<'_>) -> R + Sync) -> Vec<R> {
+        let mut results = vec![R::unknown(); self.groups()];
+        let evaluate = |group: Group<'_>, _: &[At<f64, D, D>], results: &mut [R]| results[0] = evaluate(group);
+        let own = &mut results[self.own_groups()];
+        dispatch!(self, one => one.results(Each::Group(1), 0, None, Mode::BOTH, &evaluate, own));
+        if let Some(tiled) = self.tiled() {
+            tiled.share_results(Each::Group(1), &mut results);
+        }
+        results
     }
 
     /// `out_I +=` Σ_p B_p(∇_r N_I, ∇_r N_I) + m_p N_I² I, the nodal diagonal blocks of quadratic forms. `quadratic` fills in the form of
@@ -158,36 +172,42 @@ impl<const D: usize> Supports<D> {
         Vector<f64, C>: Element,
     {
         const { assert!(C == 1 || C == D) };
-        let point = |_: usize, at: &[At<f64, C, D>], lane: usize| Vector::from_fn(|c, _| at[0].value[c][lane]);
-        let mut values = self.pool().unspecified(self.particles(), Vector::zeros());
-        let own = &mut values[self.own_places()];
-        self.at_own_particles(1, bytemuck::cast_slice(field), Mode::VALUE, own, point);
-        self.in_memory_order(&mut values, |tiled, values| tiled.share_numbers(C, bytemuck::cast_slice_mut(values)));
-        values
+        self.gathered(false, field, Mode::VALUE, |at, lane| Vector::from_fn(|c, _| at.value[c][lane]))
     }
 
     /// [`Self::values`] at the [own particles](Self::own_particles) of this process.
     pub(crate) fn own_values(&self, field: &[Vector<f64, D>]) -> Pooled<Vector<f64, D>> {
-        if !self.is_memory_order() {
-            return self.values(field);
-        }
-        let point = |_: usize, at: &[At<f64, D, D>], lane: usize| Vector::from_fn(|c, _| at[0].value[c][lane]);
-        let mut values = self.pool().unspecified(self.own_places().len(), Vector::zeros());
-        self.at_own_particles(1, bytemuck::cast_slice(field), Mode::VALUE, &mut values, point);
-        values
+        self.gathered(true, field, Mode::VALUE, |at, lane| Vector::from_fn(|c, _| at.value[c][lane]))
     }
 
     /// Σ u_I ⊗ ∇_r N_I at the [own particles](Self::own_particles) of this process.
     pub(crate) fn own_gradients(&self, field: &[Vector<f64, D>]) -> Pooled<Tensor<f64, D>> {
-        let point = |_: usize, at: &[At<f64, D, D>], lane: usize| Tensor::from_fn(|c, k| at[0].gradient[c][k][lane]);
-        let mut gradients = self.pool().unspecified(self.own_particles().len(), Tensor::zeros());
-        if self.is_memory_order() {
-            self.at_own_particles(1, bytemuck::cast_slice(field), Mode::GRADIENT, &mut gradients, point);
-            return gradients;
+        self.gathered(true, field, Mode::GRADIENT, |at, lane| Tensor::from_fn(|c, k| at.gradient[c][k][lane]))
+    }
+
+    /// `point(u and L, lane)` of all particles, or of the [own particles](Self::own_particles) of this process.
+    fn gathered<X: Element + Zero + Pod, const C: usize>(
+        &self,
+        own_alone: bool,
+        field: &[Vector<f64, C>],
+        mode: Mode,
+        point: impl Fn(&At<f64, C, D>, usize) -> X + Sync,
+    ) -> Pooled<X> {
+        let (field, own) = (bytemuck::cast_slice(field), self.own_places());
+        let point = |_: usize, at: &[At<f64, C, D>], lane: usize| point(&at[0], lane);
+        // Without the order of the passes in memory, the own particles are all particles.
+        if own_alone && self.is_memory_order() {
+            let mut results = self.pool().unspecified(own.len(), X::zero());
+            self.at_own_particles(1, field, mode, &mut results, point);
+            return results;
         }
-        self.at_own_particles(1, bytemuck::cast_slice(field), Mode::GRADIENT, &mut gradients[self.own_places()], point);
-        self.in_memory_order(&mut gradients, |tiled, all| tiled.share_numbers(D * D, bytemuck::cast_slice_mut(all)));
-        gradients
+        let mut results = self.pool().unspecified(self.particles(), X::zero());
+        self.at_own_particles(1, field, mode, &mut results[own], point);
+        let count = size_of::<X>() / size_of::<f64>();
+        self.in_memory_order(&mut results, |tiled, results| {
+            tiled.share_numbers(Each::Particle, count, bytemuck::cast_slice_mut(results));
+        });
+        results
     }
 
     /// `point(p, u_p, ∇u_p)` of every particle.
@@ -216,7 +236,7 @@ impl<const D: usize> Supports<D> {
         };
         let mut results = vec![R::unknown(); self.particles()];
         self.at_own_particles(T::FIELDS, &T::flat(field), Mode::BOTH, &mut results[self.own_places()], point);
-        self.in_memory_order(&mut results, Tiled::share_at_particles);
+        self.in_memory_order(&mut results, |tiled, results| tiled.share_results(Each::Particle, results));
         results
     }
 
@@ -229,18 +249,31 @@ impl<const D: usize> Supports<D> {
         results: &mut [R],
         point: impl Fn(usize, &[At<f64, C, D>], usize) -> R + Sync,
     ) {
-        self.pass();
         let evaluate = |group: Group<'_>, at: &[At<f64, C, D>], results: &mut [R]| {
             for (lane, (&p, result)) in group.particles.iter().zip(results).enumerate() {
                 *result = point(p as usize, at, lane);
             }
         };
-        dispatch!(self, one => one.gather(fields, field, mode, &evaluate, results));
+        self.results(Each::Particle, fields, Some(field), mode, results, evaluate);
+    }
+
+    /// Calls `evaluate(group, u and L of every field, results)` for every group of this process.
+    fn results<R: Send, const C: usize>(
+        &self,
+        each: Each,
+        fields: usize,
+        field: Option<&[f64]>,
+        mode: Mode,
+        results: &mut [R],
+        evaluate: impl Fn(Group<'_>, &[At<f64, C, D>], &mut [R]) + Sync,
+    ) {
+        self.pass();
+        dispatch!(self, one => one.results(each, fields, field, mode, &evaluate, results));
     }
 
     /// Takes the results of other processes by `share`, and moves all results to the order of the particles in memory.
     fn in_memory_order<R: Copy>(&self, results: &mut [R], share: impl FnOnce(&Tiled<D>, &mut [R])) {
-        if let Implementation::Tiled(tiled) = &self.implementation {
+        if let Some(tiled) = self.tiled() {
             share(tiled, results);
             tiled.to_memory_order(results);
         }
