@@ -7,7 +7,7 @@ use bfree::gpu::{Gpu, GpuVector};
 use bfree::mechanics::check::direction;
 use bfree::scene::{self, Override};
 use bfree::simulation::Simulation;
-use bfree::solver::{BlockJacobi, ConjugateGradientSettings, Linearization, Preconditioner};
+use bfree::solver::{BlockJacobi, ConjugateGradientSettings, Linearization, Preconditioner, System};
 use bfree::space::vector::Vectors;
 use bfree::tensor::Vector;
 use std::error::Error;
@@ -100,7 +100,7 @@ fn rates(simulation: &Simulation<3>, gpu: &Arc<Gpu>) -> Result<([f64; 3], bool),
     let settings = ConjugateGradientSettings { relative_tolerance: 1e-300, max_iterations: COUNT };
     let mut solution = gpu.zeros(3 * count);
     let iterate = |solution: &mut GpuVector| {
-        _ = settings.solve(&**gpu, &*system, &*inverse, &x, solution);
+        _ = settings.solve(&System { vectors: &**gpu, operator: &*system, inverse: &*inverse }, &x, solution);
     };
     let iteration = particles / timed(gpu, &mut solution, iterate)?;
     Ok(([product, iteration, here], same))
