@@ -276,8 +276,8 @@ mod tests {
     fn a_symmetric_top_precesses_with_second_order() {
         for scheme in [&Newmark::default() as &dyn Scheme, &GeneralizedAlpha { spectral_radius: 0.5 }] {
             let order = (error_of_top(scheme, 50) / error_of_top(scheme, 100)).log2();
-            assert!((order - 2.0).abs() < 0.1, "{scheme}: {order}");
-            assert!(error_of_top(scheme, 100) < 1e-3, "{scheme}: {}", error_of_top(scheme, 100));
+            assert!((order - 2.0).abs() < 0.1, "{scheme:?}: {order}");
+            assert!(error_of_top(scheme, 100) < 1e-3, "{scheme:?}: {}", error_of_top(scheme, 100));
         }
     }
 }
