@@ -83,7 +83,7 @@ fn rates(simulation: &Simulation<3>, gpu: &Arc<Gpu>) -> Result<([f64; 3], bool),
     let mut u = direction::<3>(count, 1);
     coming.prescribed().iter().for_each(|dof| u[dof.node][dof.component] = 0.0);
     let phi: Vec<_> = u.iter().map(|u| u * (0.01 * simulation.grid.spacing)).collect();
-    let tangent = equilibrium.tangent(&phi)?;
+    let tangent = equilibrium.tangent(None, &phi)?;
     let system = tangent.on_device().ok_or("the tangent has no form for a GPU")?;
     let numbers: Vec<f64> = u.iter().flatten().copied().collect();
     let (x, mut y) = (gpu.vector(&numbers), gpu.zeros(3 * count));

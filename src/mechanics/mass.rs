@@ -93,7 +93,7 @@ impl<const D: usize> Mass<'_, D> {
         let right = |field: &[Vector<f64, D>]| {
             let mut out: Pooled<Vector<f64, D>> = self.supports.field();
             self.supports.spread(&mut out, |p| field[p] * self.particles.mass[p]);
-            space.restrict(&mut out);
+            space.followers().restrict(&mut out);
             out
         };
         let (mut nodal, mut iterations) = (fields.map(right), 0);
@@ -106,7 +106,7 @@ impl<const D: usize> Mass<'_, D> {
             }
             let light = field.iter_mut().zip(&*lumped).filter(|(_, m)| is_light(**m));
             light.for_each(|(w, _)| *w = Vector::zeros());
-            space.extend(field);
+            space.followers().extend(field);
         }
         Ok((nodal, iterations))
     }
@@ -145,11 +145,11 @@ impl<const D: usize> Mass<'_, D> {
         // Eᵀ M̃ E
         let operator = |x: &[f64], y: &mut [f64]| {
             let mut x: Pooled<Vector<f64, D>> = vectors.collect(bytemuck::cast_slice(x).iter().copied());
-            space.extend(&mut x);
+            space.followers().extend(&mut x);
             let y: &mut [Vector<f64, D>] = bytemuck::cast_slice_mut(y);
             y.fill(Vector::zeros());
             self.add_product(1.0, &x, y);
-            space.restrict(y);
+            space.followers().restrict(y);
         };
         let inverse = |r: &[f64], z: &mut [f64]| {
             for (k, (z, r)) in z.iter_mut().zip(r).enumerate() {

@@ -152,8 +152,8 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
             failure.check(supports.processes())?;
         }
         match magnitude {
-            true => self.space.restrict_magnitudes(out),
-            false => self.space.restrict(out),
+            true => self.space.followers().restrict_magnitudes(out),
+            false => self.space.followers().restrict(out),
         }
         Ok(())
     }
@@ -202,14 +202,14 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
     pub(crate) fn sensitivity_at(&self, at: Trial<'_, f64, D>) -> Result<f64, Inadmissible> {
         let mut out = self.magnitudes(at)?;
         self.terms.add_sensitivity(&self.space.extended(at.phi), &mut out)?;
-        self.space.restrict_magnitudes(&mut out);
+        self.space.followers().restrict_magnitudes(&mut out);
         Ok(self.free_norm(out, at))
     }
 
     /// The norm of magnitudes over the unknowns of a trial state.
     fn free_norm(&self, mut field: Pooled<Vector<f64, D>>, at: Trial<'_, f64, D>) -> f64 {
         self.space.clear_prescribed(&mut field);
-        let nodes = self.space.norm(&field);
+        let nodes = vector::norm(bytemuck::cast_slice(&field));
         let cells = if at.dilatation.is_empty() { 0.0 } else { vector::norm(&self.terms.cell_magnitudes()) };
         nodes.hypot(cells)
     }

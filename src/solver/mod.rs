@@ -22,7 +22,7 @@ pub(crate) use nonnegative::NonnegativeLeastSquares;
 pub use preconditioner::{
     BlockJacobi, Identity, LocalForm, Multigrid, Preconditioner, Preconditioning, PressureCells, Saddle,
 };
-pub(crate) use preconditioner::{multigrid_bytes, saddle_bytes};
+pub(crate) use preconditioner::{multigrid_bytes, rigid_motions, saddle_bytes};
 pub use stop::Stop;
 
 use crate::gpu::{Gpu, GpuVector};

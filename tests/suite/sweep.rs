@@ -234,7 +234,7 @@ fn computed<const D: usize>(
     let dphi: Vec<_> = u.iter().map(|u| u * 0.02).collect();
     let gathered = supports.evaluate(&u, |_, value, gradient| value.sum() + gradient.sum());
     let mut product = vec![Vector::zeros(); u.len()];
-    let tangent = equilibrium.tangent(&dphi)?;
+    let tangent = equilibrium.tangent(None, &dphi)?;
     tangent.product(&u, &mut product);
     let (energy, magnitude) = equilibrium.potential(&dphi).ok_or("a potential")??;
     Ok([

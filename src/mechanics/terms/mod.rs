@@ -21,7 +21,7 @@ mod stress;
 mod term;
 
 pub(crate) use contact::{ContactForce, penalties};
-pub(crate) use planned::planned;
+pub(crate) use planned::{Reason, planned};
 pub use term::{AtPoints, Piece, Role, Step, Sum};
 
 use damping::Damping;

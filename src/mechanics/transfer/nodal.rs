@@ -167,8 +167,8 @@ impl<const D: usize> Nodal<D> {
     /// Applies E to velocity and acceleration, so that outer nodes follow the prescribed values of inner nodes.
     pub(crate) fn extended(mut self, space: &Space<D>) -> Self {
         if !self.is_static() {
-            space.extend(&mut self.velocity);
-            space.extend(&mut self.acceleration);
+            space.followers().extend(&mut self.velocity);
+            space.followers().extend(&mut self.acceleration);
         }
         self
     }
@@ -203,11 +203,11 @@ impl<const D: usize> Nodal<D> {
 /// Replaces p by E û with Eᵀ m û = Eᵀ p; û is zero at light nodes.
 fn divide<const D: usize>(particles: &Particles<D>, space: &Space<D>, mass: &[f64], p: &mut [Vector<f64, D>]) {
     let is_light = is_light(particles);
-    space.restrict(p);
+    space.followers().restrict(p);
     for (p, &m) in p.iter_mut().zip(&*restricted(space, mass)) {
         *p = if is_light(m) { Vector::zeros() } else { *p / m };
     }
-    space.extend(p);
+    space.followers().extend(p);
 }
 
 /// The particle-to-grid transfer of velocity and acceleration.

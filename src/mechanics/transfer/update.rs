@@ -149,13 +149,13 @@ impl<'a, const D: usize> Update<'a, D> {
             return self;
         }
         let mut by_forces = self.delta_velocity.clone();
-        space.extend(&mut self.delta_velocity);
-        space.extend(&mut self.delta_acceleration);
+        space.followers().extend(&mut self.delta_velocity);
+        space.followers().extend(&mut self.delta_acceleration);
         // The change of outer nodes that follow a wall node is an impulse of the wall, too.
         by_forces.iter_mut().zip(&self.delta_velocity).zip(&nodal.mass).for_each(|((before, after), &m)| {
             *before = (after - *before) * m;
         });
-        space.restrict(&mut by_forces);
+        space.followers().restrict(&mut by_forces);
         for (&(node, component), impulse) in space.prescribed().iter().zip(&mut self.impulses) {
             *impulse += by_forces[node][component];
         }

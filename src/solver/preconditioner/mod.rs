@@ -7,8 +7,8 @@ mod multigrid;
 mod saddle;
 
 pub use block_jacobi::BlockJacobi;
-pub(crate) use multigrid::bytes as multigrid_bytes;
 pub use multigrid::{LocalForm, Multigrid};
+pub(crate) use multigrid::{bytes as multigrid_bytes, rigid_motions};
 pub(crate) use saddle::bytes as saddle_bytes;
 pub use saddle::{PressureCells, Saddle};
 

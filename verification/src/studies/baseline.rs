@@ -73,7 +73,7 @@ fn solve(simulation: &Simulation<3>, by: Preconditioning) -> Result<(LinearRepor
     let settings = ConjugateGradientSettings { relative_tolerance: SOLVE, max_iterations: 10_000 };
     let mut d = vec![0.0; right.len()];
     let (start, mut preconditioner) = (Thread::now(), by.build::<3>());
-    let tangent = equilibrium.tangent(&dphi)?;
+    let tangent = equilibrium.tangent(None, &dphi)?;
     let inverse = preconditioner.prepare(&tangent);
     let system = System { vectors: &pool, operator: &tangent, inverse: &*inverse };
     let report = settings.solve(&system, right, &mut d)?;

@@ -17,6 +17,7 @@ mod on_device;
 mod rigid;
 
 pub use form::LocalForm;
+pub(crate) use rigid::rigid_motions;
 
 use super::chebyshev::largest;
 use super::{BlockJacobi, Preconditioner};

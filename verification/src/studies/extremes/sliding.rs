@@ -72,7 +72,7 @@ fn solve(shape: &Approximation, lumping: f64, overlap: f64) -> Result<f64, Study
     let dphi = vec![0.0; 2 * coming.nodes().len()];
     let mut right = dphi.clone();
     NonlinearProblem::residual(&equilibrium, &dphi, &mut right)?;
-    let tangent = equilibrium.tangent(bytemuck::cast_slice(&dphi))?;
+    let tangent = equilibrium.tangent(None, bytemuck::cast_slice(&dphi))?;
     let mut blocks = BlockJacobi::<2>::default();
     blocks.take(&tangent);
     let settings = GmresSettings { relative_tolerance: TOLERANCE, max_iterations: 10_000, restart: 200 };
