@@ -144,7 +144,7 @@ pub(crate) fn for_each_with<P: Send, S: Send + Default>(
     f: &(dyn Fn(&mut S, P) + Sync),
 ) {
     let spare = Mutex::new(Vec::new());
-    for_each(parts, &|part| {
+    collect(parts, &|part| {
         let scratch = held(&spare).pop();
         let mut scratch = scratch.unwrap_or_default();
         f(&mut scratch, part);

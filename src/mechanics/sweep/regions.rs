@@ -13,7 +13,6 @@ use super::tiled::{RANGE, Tiled};
 use super::{Each, Evaluate, Mode, Point};
 use crate::lanes::LANES;
 use crate::parallel::{self, Message};
-use crate::pooled::Pooled;
 use crate::tensor::Tensor;
 
 /// Below this number of groups, waking the threads costs more than the work.
@@ -120,17 +119,19 @@ impl<const D: usize> Tiled<D> {
         add: &Add<'_>,
     ) {
         let (own, length) = (self.own(), |block: &Block| block.box_nodes() * numbers + more);
-        let Some((first, shares)) = self.shared() else {
-            if self.in_parallel() {
-                let boxes = self.filled_boxes(length, work);
-                self.add_boxes(numbers, out, &boxed(own, length, &boxes), 0, add);
-            } else {
-                self.add_in_turn(length, out, work, add);
-            }
-            return;
-        };
-        let boxes = self.filled_boxes(length, work);
+        let shared = self.shared();
+        if shared.is_none() && !self.in_parallel() {
+            return self.add_in_turn(length, out, work, add);
+        }
+        let mut boxes = self.pool.unspecified(own.iter().map(length).sum(), 0.0);
+        let mut left = &mut boxes[..];
+        let parts = own.iter().filter_map(|block| Some((block, left.split_off_mut(..length(block))?)));
+        parallel::for_each_with(parts, &|scratch, (block, buffer): (&Block, &mut [f64])| {
+            buffer.fill(0.0);
+            work(block, scratch, buffer);
+        });
         let boxes = boxed(own, length, &boxes);
+        let Some((first, shares)) = shared else { return self.add_boxes(numbers, out, &boxes, 0, add) };
         let before = shares.at_interface(numbers, out);
         self.add_boxes(numbers, out, &boxes, first, add);
         shares.complete(numbers, (out, &before), &self.pool, &|block, node, entry| {
@@ -159,19 +160,6 @@ impl<const D: usize> Tiled<D> {
             work(block, &mut scratch, buffer);
             add(block, buffer, 0, out);
         }
-    }
-
-    /// The boxes of all own blocks, one after the other.
-    fn filled_boxes<S: Default + Send>(&self, length: impl Fn(&Block) -> usize, work: &Work<'_, S>) -> Pooled<f64> {
-        let own = self.own();
-        let mut boxes = self.pool.unspecified(own.iter().map(&length).sum(), 0.0);
-        let mut left = &mut boxes[..];
-        let parts = own.iter().filter_map(|block| Some((block, left.split_off_mut(..length(block))?)));
-        parallel::for_each_with(parts, &|scratch, (block, buffer): (&Block, &mut [f64])| {
-            buffer.fill(0.0);
-            work(block, scratch, buffer);
-        });
-        boxes
     }
 
     /// Adds the boxes of all own blocks, the first of which has the number `first`.
