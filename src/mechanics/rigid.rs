@@ -39,24 +39,7 @@ impl Display for Loose {
 }
 
 /// The first group of touching bodies (bodies that share nodes) with a free and loaded rigid-body mode.
-///
-/// ```
-/// use bfree::mechanics::rigid::loose;
-///
-/// // A column that stands on the floor of its box, and the same column without the floor.
-/// let scene = bfree::scene::read_file("scenes/column_static.json".as_ref(), &[])?;
-/// let mut simulation = scene.build::<2>("scenes".as_ref())?;
-/// let found = |of: &bfree::simulation::Simulation<2>| -> Result<_, Box<dyn std::error::Error>> {
-///     let coming = of.next_step()?;
-///     Ok(loose(&of.grid, &coming.equilibrium(), coming.nodes()))
-/// };
-/// assert_eq!(found(&simulation)?, None);
-/// simulation.loads.prescribed.clear();
-/// let falling = found(&simulation)?.ok_or("nothing holds it")?;
-/// assert_eq!(falling.axis, Some(1), "{falling}");
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-pub fn loose<const D: usize, L: Law>(
+pub(crate) fn loose<const D: usize, L: Law>(
     grid: &Grid<D>,
     equilibrium: &Equilibrium<'_, D, L>,
     nodes: &Nodes,

@@ -42,7 +42,7 @@ pub struct Processes(Option<Arc<dyn Exchange>>);
 
 impl Processes {
     /// This process alone.
-    pub const ALONE: Self = Self(None);
+    pub(crate) const ALONE: Self = Self(None);
 
     /// The processes that reach each other in this way.
     pub fn new(exchange: impl Exchange + 'static) -> Self {

@@ -19,10 +19,8 @@ pub use newton::{
     NewtonIteration, NewtonReport, NewtonSettings, newton,
 };
 pub(crate) use nonnegative::NonnegativeLeastSquares;
-pub use preconditioner::{
-    BlockJacobi, Identity, LocalForm, Multigrid, Preconditioner, Preconditioning, PressureCells, Saddle,
-};
-pub(crate) use preconditioner::{multigrid_bytes, rigid_motions, saddle_bytes};
+pub use preconditioner::{BlockJacobi, Identity, LocalForm, Multigrid, Preconditioner, Preconditioning, PressureCells};
+pub(crate) use preconditioner::{Saddle, multigrid_bytes, rigid_motions, saddle_bytes};
 pub use stop::Stop;
 
 use crate::gpu::{Gpu, GpuVector};

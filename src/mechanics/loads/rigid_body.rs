@@ -100,7 +100,8 @@ impl<const D: usize> RigidBody<D> {
     /// let disc = RigidBody::new(5.0, identity::<f64, 3>() * 0.5, center, Vector::zeros(), spin);
     /// let mut q = Vector::zeros();
     /// q[5] = std::f64::consts::FRAC_PI_2;
-    /// let right = disc.pose(&q).to_space(&Vector::from([3.0, 1.0]));
+    /// let pose = disc.pose(&q);
+    /// let right = pose.rotation * Vector::from([3.0, 1.0]) + pose.shift;
     /// assert!((right - Vector::from([2.0, 2.0])).norm() < 1e-14);
     /// assert_eq!(disc.kinetic_energy(), 2.25);
     /// ```

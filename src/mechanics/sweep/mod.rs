@@ -48,8 +48,7 @@ mod shares;
 mod supports;
 mod tiled;
 
-pub use blocks::Quadratic;
-pub(crate) use blocks::pair;
+pub(crate) use blocks::{Quadratic, pair};
 pub(crate) use columns::WIDEST;
 pub use fields::Fields;
 pub use group::{At, Group};

@@ -22,7 +22,8 @@ mod term;
 
 pub(crate) use contact::{ContactForce, penalties};
 pub(crate) use planned::{Reason, planned};
-pub use term::{AtPoints, Piece, Role, Step, Sum};
+pub(crate) use term::{AtPoints, Sum};
+pub use term::{Piece, Role, Step};
 
 use damping::Damping;
 use dead_load::DeadLoad;

@@ -56,7 +56,6 @@ pub struct Committed {
 /// let mut update = Update::new(&alphas, &nodal, &nodal, &[], WallUpdate::Literal, &dphi);
 /// update.smooth(&Smoothing::limited(40.0), &particles, &supports, &nodal.mass, dt);
 /// assert!(update.impulses().is_empty()); // no walls
-/// assert_eq!(update.leaving(&particles, &supports, &simulation.grid), None);
 /// update.commit(&mut particles, &simulation.bodies, &supports, dt);
 /// let flown = particles.position[7] - simulation.particles.position[7] - particles.velocity[7] * dt;
 /// assert!(flown.norm() < 1e-14);
@@ -166,25 +165,7 @@ impl<'a, const D: usize> Update<'a, D> {
     /// over the mass. The error is the difference to Taylor's series with the third derivative ȧ = Δa/Δt: e = c Δt² Δa, exact to leading
     /// order in Δt. The `constant` c is that of the scheme, β − 1/6 for Newmark. A resting wall that leaves the particles' acceleration
     /// alone adds no error, and neither does smoothing.
-    ///
-    /// ```
-    /// use bfree::mechanics::{schemes::Newmark, sweep::Supports, transfer::{Nodal, Update, WallUpdate}};
-    /// use bfree::tensor::Vector;
-    ///
-    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
-    /// let simulation = scene.build::<2>("scenes".as_ref())?;
-    /// let (particles, dt) = (&simulation.particles, 0.05);
-    /// let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
-    /// let (nodal, newmark) = (Nodal::at_rest(particles, &supports), Newmark::default());
-    /// // From rest to the acceleration a within the step: Δφ = β Δt² a, and a third derivative a/Δt.
-    /// let (a, Newmark { beta, .. }) = (Vector::from([3.0, 4.0]), newmark);
-    /// let dphi = vec![a * (beta * dt * dt); nodes.len()];
-    /// let update = Update::new(&newmark.alphas(dt), &nodal, &nodal, &[], WallUpdate::Literal, &dphi);
-    /// let error = update.local_error(particles, &supports, beta - 1.0 / 6.0, dt);
-    /// assert!((error / ((beta - 1.0 / 6.0) * dt * dt * a.norm()) - 1.0).abs() < 1e-12);
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    pub fn local_error(&self, particles: &Particles<D>, supports: &Supports<D>, constant: f64, dt: f64) -> f64 {
+    pub(crate) fn local_error(&self, particles: &Particles<D>, supports: &Supports<D>, constant: f64, dt: f64) -> f64 {
         let mass = &particles.mass;
         let mut squares = 0.0;
         if !self.delta_acceleration.is_empty() {
@@ -253,7 +234,7 @@ impl<'a, const D: usize> Update<'a, D> {
     }
 
     /// The particle with the smallest id of those that would leave the grid: its id, and its position outside.
-    pub fn leaving(
+    pub(crate) fn leaving(
         &self,
         particles: &Particles<D>,
         supports: &Supports<D>,
@@ -394,4 +375,26 @@ fn yielding<const D: usize, L: Law>(particles: &Particles<D>, bodies: &[Body<L>]
         }
     }
     if plastic > 0.0 { yielding / plastic } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_error_of_a_third_derivative_is_the_difference_to_taylors_series() -> Result<(), Box<dyn std::error::Error>> {
+        use crate::mechanics::schemes::Newmark;
+        let scene = crate::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+        let simulation = scene.build::<2>("scenes".as_ref())?;
+        let (particles, dt) = (&simulation.particles, 0.05);
+        let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
+        let (nodal, newmark) = (Nodal::at_rest(particles, &supports), Newmark::default());
+        // From rest to the acceleration a within the step: Δφ = β Δt² a, and a third derivative a/Δt.
+        let (a, beta) = (Vector::from([3.0, 4.0]), newmark.beta);
+        let dphi = vec![a * (beta * dt * dt); nodes.len()];
+        let update = Update::new(&newmark.alphas(dt), &nodal, &nodal, &[], WallUpdate::Literal, &dphi);
+        let error = update.local_error(particles, &supports, beta - 1.0 / 6.0, dt);
+        assert!((error / ((beta - 1.0 / 6.0) * dt * dt * a.norm()) - 1.0).abs() < 1e-12);
+        Ok(())
+    }
 }

@@ -9,8 +9,8 @@ mod saddle;
 pub use block_jacobi::BlockJacobi;
 pub use multigrid::{LocalForm, Multigrid};
 pub(crate) use multigrid::{bytes as multigrid_bytes, rigid_motions};
-pub(crate) use saddle::bytes as saddle_bytes;
-pub use saddle::{PressureCells, Saddle};
+pub use saddle::PressureCells;
+pub(crate) use saddle::{Saddle, bytes as saddle_bytes};
 
 use super::{LinearOperator, Linearization, OnDevice};
 use crate::gpu::GpuVector;
