@@ -189,7 +189,7 @@ fn wrong_pieces<const D: usize>(
 ) -> Result<Vec<&'static str>, Failure> {
     let mut wrong = Vec::new();
     for piece in equilibrium.terms.pieces() {
-        let (mut product, dual) = (vec![Vector::zeros(); u.len()], derivative(&equilibrium, piece, dphi, u)?);
+        let (mut product, dual) = (vec![Vector::zeros(); u.len()], derivative(equilibrium, piece, dphi, u)?);
         equilibrium.tangent(piece, dphi)?.product(u, &mut product);
         let apart: Vec<_> = product.iter().zip(&dual).map(|(a, b)| a - b).collect();
         // In 1D a follower pressure has no derivative.
