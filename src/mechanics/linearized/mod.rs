@@ -3,7 +3,7 @@
 //! | array | entries | its part of K u |
 //! |---|---|---|
 //! | α M̃ | nodes, particles | α (ε m_I u_I + Σ_p (1 − ε) m_p u_p N_I) |
-//! | [`StressRows`] | particles | Σ_p (𝔸 : L) ∇_r N_I |
+//! | [`Rows`] | particles | Σ_p (𝔸 : L) ∇_r N_I |
 //! | [`CellRows`] | particles, averaged cells | Σ_p (𝔸 : L + δp a) ∇_r N_I with δp = k Σ_{q∈c} b_q : L_q |
 //! | [`PressureRows`] | points of loaded surfaces | Σ δ(p A cof(F) N) N_I |
 //! | [`ContactRows`] | points in contact | −Σ (∂f/∂x δx + ∂f/∂q δq) N_I |
@@ -11,12 +11,12 @@
 mod cells;
 mod contact;
 mod pressure;
-mod stress;
+mod rows;
 
 pub(crate) use cells::{CellLayout, CellRows, MixedCell};
 pub(crate) use contact::{ContactRow, ContactRows};
 pub(crate) use pressure::{PressureRow, PressureRows};
-pub(crate) use stress::StressRows;
+pub(crate) use rows::Rows;
 
 use crate::gpu::{self, Gpu};
 use crate::mechanics::effective::Function;
@@ -30,7 +30,7 @@ pub(crate) struct Linearized<const D: usize> {
     /// α, the factor of M̃.
     pub mass: f64,
     /// The tangents of the laws.
-    pub stresses: Vec<StressRows>,
+    pub stresses: Vec<Rows>,
     /// The tangents of averaged cells.
     pub cells: Vec<CellRows<D>>,
     /// Follower pressures.
@@ -115,7 +115,7 @@ impl<const D: usize> Linearized<D> {
 
     /// The rows of laws and averaged cells on a device.
     pub(crate) fn rows_on_device(&self, gpu: &Gpu, supports: &Supports<D>) -> Vec<gpu::Rows> {
-        let stresses = self.stresses.iter().map(|rows| rows.on_device(gpu, D));
+        let stresses = self.stresses.iter().map(|rows| rows.on_device(gpu));
         stresses.chain(self.cells.iter().map(|cells| cells.on_device(gpu, supports))).collect()
     }
 
@@ -147,8 +147,8 @@ impl<const D: usize> Linearized<D> {
                 form.mass[lane] += self.mass * mass.consistent(p as usize);
             }
         }
-        self.stresses.iter().for_each(|rows| rows.add_quadratic(D, group, form));
-        self.cells.iter().for_each(|rows| rows.add_quadratic(group, form));
+        let rows = self.stresses.iter().chain(self.cells.iter().map(|cells| &cells.rows));
+        rows.for_each(|rows| rows.add_quadratic(D, group, form));
     }
 
     /// The averaged cells whose dilatation is an unknown of its own.
