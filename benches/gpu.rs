@@ -7,7 +7,7 @@ use bfree::gpu::{Gpu, GpuVector};
 use bfree::mechanics::check::direction;
 use bfree::scene::{self, Override};
 use bfree::simulation::Simulation;
-use bfree::solver::{BlockJacobi, ConjugateGradientSettings, Linearization, Preconditioner};
+use bfree::solver::{BlockJacobi, ConjugateGradientSettings, Linearization, Preconditioner, System};
 use bfree::space::vector::Vectors;
 use bfree::tensor::Vector;
 use std::error::Error;
@@ -83,7 +83,7 @@ fn rates(simulation: &Simulation<3>, gpu: &Arc<Gpu>) -> Result<([f64; 3], bool),
     let mut u = direction::<3>(count, 1);
     coming.prescribed().iter().for_each(|dof| u[dof.node][dof.component] = 0.0);
     let phi: Vec<_> = u.iter().map(|u| u * (0.01 * simulation.grid.spacing)).collect();
-    let tangent = equilibrium.tangent(&phi)?;
+    let tangent = equilibrium.tangent(None, &phi)?;
     let system = tangent.on_device().ok_or("the tangent has no form for a GPU")?;
     let numbers: Vec<f64> = u.iter().flatten().copied().collect();
     let (x, mut y) = (gpu.vector(&numbers), gpu.zeros(3 * count));
@@ -100,7 +100,7 @@ fn rates(simulation: &Simulation<3>, gpu: &Arc<Gpu>) -> Result<([f64; 3], bool),
     let settings = ConjugateGradientSettings { relative_tolerance: 1e-300, max_iterations: COUNT };
     let mut solution = gpu.zeros(3 * count);
     let iterate = |solution: &mut GpuVector| {
-        _ = settings.solve(&**gpu, &*system, &*inverse, &x, solution);
+        _ = settings.solve(&System { vectors: &**gpu, operator: &*system, inverse: &*inverse }, &x, solution);
     };
     let iteration = particles / timed(gpu, &mut solution, iterate)?;
     Ok(([product, iteration, here], same))

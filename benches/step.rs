@@ -79,7 +79,7 @@ macro_rules! in_dimension {
                     shape,
                     $cells,
                     |bencher, at, u| {
-                        let tangent = at.tangent(u).expect("admissible");
+                        let tangent = at.tangent(None, u).expect("admissible");
                         let mut out = vec![Vector::zeros(); u.len()];
                         bencher.bench_local(|| tangent.product(black_box(u), &mut out));
                     },
@@ -105,7 +105,7 @@ macro_rules! in_dimension {
                     shape,
                     $cells,
                     |bencher, at, u| {
-                        bencher.bench_local(|| at.tangent(black_box(u)).is_ok());
+                        bencher.bench_local(|| at.tangent(None, black_box(u)).is_ok());
                     },
                 );
             }

@@ -81,7 +81,7 @@
 //! and the line search accepts a step by Π where ‖R‖ does not fall. It refuses a state with det F ≤ 0.
 //!
 //! **4. Newton's method** ([`solver::newton()`]) solves R = 0 on the free degrees of freedom. The linear systems K d = −R are solved by
-//! conjugate gradients ([`solver::conjugate_gradient()`]), or by GMRES ([`solver::gmres()`]) where K is not symmetric. The product with K
+//! [conjugate gradients](solver::ConjugateGradientSettings::solve), or by [GMRES](solver::GmresSettings::solve) where K is not symmetric. The product with K
 //! is applied particle by particle and never assembled (30), (34), with δF = Σ_J u_J ⊗ ∇N_J:
 //!
 //! ```text

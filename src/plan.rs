@@ -15,7 +15,7 @@ use crate::mechanics::loads::PrescribedDof;
 use crate::mechanics::loads::{Motion, Pressing, SurfaceLoad, SurfacePoint};
 use crate::mechanics::reference::GridReset;
 use crate::mechanics::sweep::{SupportError, Supports};
-use crate::mechanics::terms::planned;
+use crate::mechanics::terms::{Reason, planned};
 use crate::particles::Body;
 use crate::simulation::{SharedNodes, Simulation};
 use crate::solver::{Krylov, Preconditioning};
@@ -25,17 +25,6 @@ use indicatif::BinaryBytes;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::{Display, Formatter};
-
-/// A term of the residual, or a part of the step, and whether this scene has it.
-#[derive(Clone, Debug, PartialEq)]
-pub struct TermUse {
-    /// The name of the term.
-    pub name: &'static str,
-    /// Whether the term is computed.
-    pub used: bool,
-    /// The reason.
-    pub why: String,
-}
 
 /// The points of a loaded surface.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -145,8 +134,8 @@ pub struct Plan {
     pub krylov: (Krylov, &'static str),
     /// The preconditioner of the linear systems, and the reason.
     pub preconditioner: (Preconditioning, &'static str),
-    /// Terms of the residual and parts of the step.
-    pub terms: Vec<TermUse>,
+    /// Terms of the residual and parts of the step: the name, whether it is computed, and the reason.
+    pub terms: Vec<(&'static str, bool, String)>,
     /// The large arrays.
     pub arrays: Vec<ArrayUse>,
     /// The points and the area assumed for each loaded surface.
@@ -235,7 +224,7 @@ fn terms<const D: usize, L: Law, A>(
     simulation: &Simulation<D, L, A>,
     supports: &Supports<D>,
     cells: usize,
-) -> Vec<TermUse> {
+) -> Vec<Reason> {
     let loads = &simulation.loads;
     let settings = &simulation.settings;
     let scheme = &*settings.scheme;
@@ -263,7 +252,7 @@ fn terms<const D: usize, L: Law, A>(
         ("prescribed nodes", !loads.prescribed.is_empty(), format!("{} conditions", loads.prescribed.len())),
         ("work of moving walls", moving, "only where a prescribed motion does not rest".into()),
     ]);
-    all.into_iter().map(|(name, used, why)| TermUse { name, used, why }).collect()
+    all
 }
 
 impl Display for Plan {
@@ -279,8 +268,8 @@ impl Display for Plan {
         let (preconditioner, why) = self.preconditioner;
         writeln!(f, "conditioned   {preconditioner}: {why}")?;
         writeln!(f, "terms")?;
-        for term in &self.terms {
-            writeln!(f, "  {} {:<22} {}", if term.used { "on " } else { "off" }, term.name, term.why)?;
+        for (name, used, why) in &self.terms {
+            writeln!(f, "  {} {name:<22} {why}", if *used { "on " } else { "off" })?;
         }
         for SurfaceUse { load, points, area, sides, force } in &self.surfaces {
             let sides: Vec<String> = sides.iter().map(|(side, area)| format!("{side} {area:.6}")).collect();

@@ -70,7 +70,7 @@ impl<const D: usize> System for NextStep<D, BodyLaw, Approximation> {
 
     fn products(&self, dphi: &[f64], us: &[Vec<f64>]) -> Result<Vec<Vec<f64>>, Inadmissible> {
         let equilibrium = self.equilibrium();
-        let tangent = equilibrium.tangent(&self.motion(&vectors(dphi)))?;
+        let tangent = equilibrium.tangent(None, &self.motion(&vectors(dphi)))?;
         let product = |u: &Vec<f64>| {
             let mut u = vectors(u);
             equilibrium.clear_prescribed(&mut u);

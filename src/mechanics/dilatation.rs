@@ -49,7 +49,7 @@ impl Scale {
 }
 
 /// The particles whose volume ratios are averaged, cell by cell.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct Cells {
     /// Sorted by cell and id, so that sums do not depend on the order of particles in memory.
     members: Vec<Member>,
@@ -126,10 +126,7 @@ impl Cells {
             members: keyed.iter().map(|&(.., member)| member).collect(),
             starts: vec![0],
             of: vec![NONE; particles.len()],
-            beside: Vec::new(),
-            volumes: Vec::new(),
-            ids: Vec::new(),
-            scales: Vec::new(),
+            ..Self::default()
         };
         let scales: Vec<Scale> = bodies.iter().map(|body| Scale::of(body, grid.spacing)).collect();
         let mut keys = Vec::new();

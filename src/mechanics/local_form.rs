@@ -2,7 +2,7 @@
 
 use crate::lanes::LANES;
 use crate::mechanics::linearized::{Along, PressureChanges};
-use crate::mechanics::sweep::{At, Group};
+use crate::mechanics::sweep::At;
 use crate::mechanics::tangent::Tangent;
 use crate::solver::LocalForm;
 use crate::tensor::{Tensor, Vector};
@@ -54,12 +54,27 @@ impl<const D: usize> Tangent<'_, D> {
             ..LocalForm::default()
         };
         let mut places = FxHashMap::default();
-        let mut number = |GroupCells { cells, slots }: GroupCells| -> [Option<usize>; LANES] {
-            let numbers: Vec<usize> = cells.into_iter().map(|cell| cell.add_to(&mut form, &mut places, D)).collect();
-            slots.map(|slot| Some(numbers[slot?]))
-        };
         let mut cells = Vec::with_capacity(self.supports().groups());
-        self.supports().each_group(|group| cells.push(number(self.cells_of(group))));
+        self.supports().each_group(|group| {
+            let (mut of_lanes, mut shares) = ([None; LANES], [Vector::<f64, 4>::zeros(); LANES]);
+            let lanes = group.particles.iter().map(|&p| p as usize).enumerate();
+            for (lane, p) in lanes.filter(|&(_, p)| self.mass.particles.is_solid(p)) {
+                let (at, share) = self.share_of_cell(p);
+                of_lanes[lane] = Some(*places.entry(at).or_insert_with(|| {
+                    form.push_cell(at, D.pow(4));
+                    form.cells.len() - 1
+                }));
+                shares[lane] = share;
+            }
+            let (own, slots) = distinct(&of_lanes);
+            let mut sums = vec![Vector::<f64, 4>::zeros(); own.len()];
+            in_cells(&slots).for_each(|(lane, slot)| sums[slot] += shares[lane]);
+            for (cell, sum) in own.into_iter().zip(sums) {
+                form.filled[cell] += sum[0];
+                (0..3).for_each(|k| form.centres[cell][k] += sum[k + 1]);
+            }
+            cells.push(of_lanes);
+        });
         form.finish_centres();
         let mut unit = At::<f64, D, D>::zero();
         unit.value[0] = [1.0; LANES];
@@ -81,26 +96,19 @@ impl<const D: usize> Tangent<'_, D> {
         self.data.pressure_changes(self.supports(), Along::Gradient(gradient))
     }
 
-    /// The cells of the particles of a group. Surface points belong to no cell.
-    fn cells_of(&self, group: Group<'_>) -> GroupCells {
-        let (grid, reference) = (self.supports().grid(), self.mass.particles.reference());
-        let volume = grid.spacing.powi(D as i32);
-        let mut all = GroupCells::default();
-        let lanes = group.particles.iter().enumerate();
-        for (lane, &p) in lanes.filter(|(_, p)| self.mass.particles.is_solid(**p as usize)) {
-            let x = &reference.position[p as usize];
-            let within = grid.cell(x).unwrap_or([0; D]);
-            let at = self.supports().in_lattice(self.supports().field_of(self.mass.particles.body[p as usize]), within);
-            let share = reference.volume(p as usize) / volume;
-            let slot = all.slot(at);
-            all.slots[lane] = Some(slot);
-            all.cells[slot].share += share;
-            for k in 0..D {
-                let local = (x[k] - grid.origin[k]) / grid.spacing;
-                all.cells[slot].centre[k] += share * (local + f64::from(at[k] - within[k]));
-            }
+    /// The cell of a particle in the lattice of the nodal fields, the volume of the particle over that of the cell, and this share times x.
+    fn share_of_cell(&self, p: usize) -> ([u32; 3], Vector<f64, 4>) {
+        let (grid, particles) = (self.supports().grid(), self.mass.particles);
+        let (x, volume) = (&particles.reference().position[p], particles.reference().volume(p));
+        let within = grid.cell(x).unwrap_or([0; D]);
+        let at = self.supports().in_lattice(self.supports().field_of(particles.body[p]), within);
+        let mut share = Vector::zeros();
+        share[0] = volume / grid.spacing.powi(D as i32);
+        for k in 0..D {
+            let local = (x[k] - grid.origin[k]) / grid.spacing;
+            share[k + 1] = share[0] * (local + f64::from(at[k] - within[k]));
         }
-        all
+        (at, share)
     }
 
     /// For each node, the force at the node under uniform motions of its nodal field along the axes, from the terms at nodes. The other fields
@@ -117,44 +125,6 @@ impl<const D: usize> Tangent<'_, D> {
             blocks[moving.clone()].iter_mut().zip(&out[moving]).for_each(|(block, out)| block.set_column(k, out));
         }
         blocks
-    }
-}
-
-/// The share of a group's particles in a cell: their volume over that of the cell, and Σ share x.
-#[derive(Clone, Debug)]
-struct CellShare {
-    at: [u32; 3],
-    share: f64,
-    centre: [f64; 3],
-}
-
-impl CellShare {
-    /// Adds the share to the form. Returns the number of the cell there. `places` are the numbers of the cells so far.
-    fn add_to(self, form: &mut LocalForm, places: &mut FxHashMap<[u32; 3], usize>, dimension: usize) -> usize {
-        let cell = *places.entry(self.at).or_insert_with(|| {
-            form.push_cell(self.at, dimension.pow(4));
-            form.cells.len() - 1
-        });
-        form.filled[cell] += self.share;
-        form.centres[cell].iter_mut().zip(self.centre).for_each(|(sum, centre)| *sum += centre);
-        cell
-    }
-}
-
-/// The cells of a group, and for each lane the place of its cell among them.
-#[derive(Clone, Debug, Default)]
-struct GroupCells {
-    cells: Vec<CellShare>,
-    slots: [Option<usize>; LANES],
-}
-
-impl GroupCells {
-    /// The place of a cell, which is added if it is not there.
-    fn slot(&mut self, at: [u32; 3]) -> usize {
-        self.cells.iter().position(|cell| cell.at == at).unwrap_or_else(|| {
-            self.cells.push(CellShare { at, share: 0.0, centre: [0.0; 3] });
-            self.cells.len() - 1
-        })
     }
 }
 

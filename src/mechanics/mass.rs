@@ -4,7 +4,7 @@ use crate::mechanics::sweep::{At, Group, Mode, Supports, Weights};
 use crate::parallel::{self, PART};
 use crate::particles::Particles;
 use crate::pooled::Pooled;
-use crate::solver::{ConjugateGradientSettings, LinearError, LinearOperator, conjugate_gradient};
+use crate::solver::{ConjugateGradientSettings, LinearError, System};
 use crate::space::Space;
 use crate::tensor::Vector;
 use std::borrow::Cow;
@@ -57,7 +57,7 @@ impl<const D: usize> Mass<'_, D> {
         self.add_lumped(factor, u, out);
         if self.lumping < 1.0 {
             mutant!("mass: the product takes ε for 1 − ε": factor = factor * self.lumping / (1.0 - self.lumping));
-            self.supports.accumulate(Some(u), Mode::VALUE, out, |group, at, sums| {
+            self.supports.sweep(Some(u), Mode::VALUE, out, |group, at, sums| {
                 self.add_consistent(factor, group, at, sums);
             });
         }
@@ -93,7 +93,7 @@ impl<const D: usize> Mass<'_, D> {
         let right = |field: &[Vector<f64, D>]| {
             let mut out: Pooled<Vector<f64, D>> = self.supports.field();
             self.supports.spread(&mut out, |p| field[p] * self.particles.mass[p]);
-            space.restrict(&mut out);
+            space.followers().restrict(&mut out);
             out
         };
         let (mut nodal, mut iterations) = (fields.map(right), 0);
@@ -101,12 +101,12 @@ impl<const D: usize> Mass<'_, D> {
         let is_light = is_light(self.particles);
         for field in &mut nodal {
             match &inverse_diagonal {
-                Some(inverse_diagonal) => iterations += self.solve(&space, &Jacobi(inverse_diagonal), field)?,
+                Some(inverse_diagonal) => iterations += self.solve(&space, inverse_diagonal, field)?,
                 None => field.iter_mut().zip(&*lumped).for_each(|(w, &m)| *w /= m),
             }
             let light = field.iter_mut().zip(&*lumped).filter(|(_, m)| is_light(**m));
             light.for_each(|(w, _)| *w = Vector::zeros());
-            space.extend(field);
+            space.followers().extend(field);
         }
         Ok((nodal, iterations))
     }
@@ -131,7 +131,7 @@ impl<const D: usize> Mass<'_, D> {
     fn solve(
         &self,
         space: &Space<D>,
-        jacobi: &Jacobi<'_, D>,
+        inverse_diagonal: &[f64],
         field: &mut [Vector<f64, D>],
     ) -> Result<usize, LinearError> {
         let right = self.supports.pool().collect(field.iter().copied());
@@ -141,8 +141,23 @@ impl<const D: usize> Mass<'_, D> {
             max_iterations: 10 * right.len() + 100,
         };
         let (right, solution) = (bytemuck::cast_slice(&right), bytemuck::cast_slice_mut(field));
-        let operator = Restricted { mass: self, space };
-        Ok(conjugate_gradient(&operator, jacobi, right, solution, &settings, self.supports.pool())?.iterations)
+        let vectors = self.supports.pool();
+        // Eᵀ M̃ E
+        let operator = |x: &[f64], y: &mut [f64]| {
+            let mut x: Pooled<Vector<f64, D>> = vectors.collect(bytemuck::cast_slice(x).iter().copied());
+            space.followers().extend(&mut x);
+            let y: &mut [Vector<f64, D>] = bytemuck::cast_slice_mut(y);
+            y.fill(Vector::zeros());
+            self.add_product(1.0, &x, y);
+            space.followers().restrict(y);
+        };
+        let inverse = |r: &[f64], z: &mut [f64]| {
+            for (k, (z, r)) in z.iter_mut().zip(r).enumerate() {
+                *z = r * inverse_diagonal[k / D];
+            }
+        };
+        let system = System { vectors, operator: &operator, inverse: &inverse };
+        Ok(settings.solve(&system, right, solution)?.iterations)
     }
 }
 
@@ -155,32 +170,4 @@ pub(super) fn restricted<'a, const D: usize>(space: &Space<D>, mass: &'a [f64]) 
         leaders.for_each(|(leader, weight)| mass[leader] += weight * own);
     }
     mass
-}
-
-/// Eᵀ M̃ E
-struct Restricted<'a, const D: usize> {
-    mass: &'a Mass<'a, D>,
-    space: &'a Space<D>,
-}
-
-impl<const D: usize> LinearOperator for Restricted<'_, D> {
-    fn apply(&self, x: &[f64], y: &mut [f64]) {
-        let mut x: Pooled<Vector<f64, D>> = self.mass.supports.pool().collect(bytemuck::cast_slice(x).iter().copied());
-        self.space.extend(&mut x);
-        let y: &mut [Vector<f64, D>] = bytemuck::cast_slice_mut(y);
-        y.fill(Vector::zeros());
-        self.mass.add_product(1.0, &x, y);
-        self.space.restrict(y);
-    }
-}
-
-/// The inverse diagonal of M̃.
-struct Jacobi<'a, const D: usize>(&'a [f64]);
-
-impl<const D: usize> LinearOperator for Jacobi<'_, D> {
-    fn apply(&self, r: &[f64], z: &mut [f64]) {
-        for (k, (z, r)) in z.iter_mut().zip(r).enumerate() {
-            *z = r * self.0[k / D];
-        }
-    }
 }

@@ -12,7 +12,7 @@ pub(crate) mod kinematics;
 pub(crate) mod linearized;
 pub mod loads;
 mod local_form;
-pub mod mass;
+pub(crate) mod mass;
 pub(crate) mod mixed;
 mod on_device;
 pub mod path;

@@ -83,7 +83,7 @@ impl<'a, const D: usize, L: Law> OnPath<'a, D, L> {
         rate: &[Vector<f64, D>],
         dt: f64,
     ) -> Result<Self, Inadmissible> {
-        let size = start.space.norm(rate);
+        let size = vector::norm(bytemuck::cast_slice(rate));
         let before = start.step.supports.pool().collect(start.step.nodal.moved(rate.len()));
         let direction = rate.iter().map(|rate| rate / size).collect();
         Ok(Self { path, start, force, at_start: force(path.load)?, before, direction, length: path.speed * dt })
@@ -174,7 +174,7 @@ impl<const D: usize> LinearOperator for Bordered<'_, D> {
         self.tangent.apply(x, y);
         let along = vector::dot(bytemuck::cast_slice(self.direction), x);
         mutant!("path: its tangent forgets the loads": along = 0.0 * along);
-        vector::axpy(along, bytemuck::cast_slice(&self.slope), y);
+        self.slope.pool().axpy(along, bytemuck::cast_slice(&self.slope), y);
     }
 }
 

@@ -11,6 +11,7 @@ use crate::mechanics::sweep::{Mode, Number, Weights};
 use crate::mechanics::symmetry::Unsymmetric;
 use crate::mechanics::terms::{Piece, Role, Step, Terms};
 use crate::mechanics::trial::Trial;
+use crate::parallel::First;
 use crate::pooled::Pooled;
 use crate::solver::Stop;
 use crate::space::{Space, vector};
@@ -138,19 +139,21 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
         points.retain(|(mode, _)| !magnitude || mode.gradient);
         let (modes, all): (Vec<_>, Vec<_>) = points.into_iter().unzip();
         if let Some(mode) = modes.into_iter().reduce(Mode::and) {
-            self.step.supports.sweep(Some(phi), Mode { weights, ..mode }, out, |group, at, sums| {
-                for add in &all {
-                    add(group, at, sums).map_err(|error| (error.particle, error))?;
+            let (supports, failure) = (self.step.supports, First::none());
+            supports.sweep(Some(phi), Mode { weights, ..mode }, out, |group, at, sums| {
+                let added = all.iter().try_for_each(|add| add(group, at, sums));
+                if let Err(error) = added {
+                    failure.keep(error.particle, error);
                 }
                 if magnitude {
                     sums.gradient.as_flattened_mut().as_flattened_mut().iter_mut().for_each(|x| *x = x.abs());
                 }
-                Ok(())
-            })?;
+            });
+            failure.check(supports.processes())?;
         }
         match magnitude {
-            true => self.space.restrict_magnitudes(out),
-            false => self.space.restrict(out),
+            true => self.space.followers().restrict_magnitudes(out),
+            false => self.space.followers().restrict(out),
         }
         Ok(())
     }
@@ -199,14 +202,14 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
     pub(crate) fn sensitivity_at(&self, at: Trial<'_, f64, D>) -> Result<f64, Inadmissible> {
         let mut out = self.magnitudes(at)?;
         self.terms.add_sensitivity(&self.space.extended(at.phi), &mut out)?;
-        self.space.restrict_magnitudes(&mut out);
+        self.space.followers().restrict_magnitudes(&mut out);
         Ok(self.free_norm(out, at))
     }
 
     /// The norm of magnitudes over the unknowns of a trial state.
     fn free_norm(&self, mut field: Pooled<Vector<f64, D>>, at: Trial<'_, f64, D>) -> f64 {
         self.space.clear_prescribed(&mut field);
-        let nodes = self.space.norm(&field);
+        let nodes = vector::norm(bytemuck::cast_slice(&field));
         let cells = if at.dilatation.is_empty() { 0.0 } else { vector::norm(&self.terms.cell_magnitudes()) };
         nodes.hypot(cells)
     }

@@ -6,6 +6,7 @@ use crate::material::Law;
 use crate::mechanics::residual::Equilibrium;
 use crate::mechanics::sweep::Supports;
 use crate::mechanics::terms::Step;
+use crate::solver::rigid_motions;
 use crate::space::Nodes;
 use crate::tensor::Vector;
 use nalgebra::{DMatrix, DVector};
@@ -38,24 +39,7 @@ impl Display for Loose {
 }
 
 /// The first group of touching bodies (bodies that share nodes) with a free and loaded rigid-body mode.
-///
-/// ```
-/// use bfree::mechanics::rigid::loose;
-///
-/// // A column that stands on the floor of its box, and the same column without the floor.
-/// let scene = bfree::scene::read_file("scenes/column_static.json".as_ref(), &[])?;
-/// let mut simulation = scene.build::<2>("scenes".as_ref())?;
-/// let found = |of: &bfree::simulation::Simulation<2>| -> Result<_, Box<dyn std::error::Error>> {
-///     let coming = of.next_step()?;
-///     Ok(loose(&of.grid, &coming.equilibrium(), coming.nodes()))
-/// };
-/// assert_eq!(found(&simulation)?, None);
-/// simulation.loads.prescribed.clear();
-/// let falling = found(&simulation)?.ok_or("nothing holds it")?;
-/// assert_eq!(falling.axis, Some(1), "{falling}");
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-pub fn loose<const D: usize, L: Law>(
+pub(crate) fn loose<const D: usize, L: Law>(
     grid: &Grid<D>,
     equilibrium: &Equilibrium<'_, D, L>,
     nodes: &Nodes,
@@ -101,19 +85,6 @@ fn groups<const D: usize>(supports: &Supports<D>, count: usize) -> Vec<usize> {
     (0..count).map(|node| root(&mut parent, node)).collect()
 }
 
-/// The rigid-body modes at x: translations, then rotations about `centre` in units of `size`.
-fn rigid_motions<const D: usize>(x: &Vector<f64, D>, centre: &Vector<f64, D>, size: f64) -> Vec<Vector<f64, D>> {
-    let arm = (x - centre) / size;
-    let axes = (0..D).map(|k| Vector::from_fn(|i, _| f64::from(i == k)));
-    let planes = (0..D).flat_map(|i| (i + 1..D).map(move |k| (i, k)));
-    let turns = planes.map(|(i, k)| {
-        let mut turn = Vector::zeros();
-        (turn[i], turn[k]) = (-arm[k], arm[i]);
-        turn
-    });
-    axes.chain(turns).collect()
-}
-
 /// The loaded rigid-body mode of the nodes `members` that the degrees of freedom `held` leave free; `None` if there is none. `Some(axis)`
 /// is a translation, `Some(None)` any other mode.
 fn pushed<const D: usize>(
@@ -124,7 +95,8 @@ fn pushed<const D: usize>(
 ) -> Option<Option<usize>> {
     let centre = members.iter().map(|&node| positions[node]).sum::<Vector<f64, D>>() / members.len() as f64;
     let size = members.iter().map(|&node| (positions[node] - centre).norm()).fold(f64::MIN_POSITIVE, f64::max);
-    let motions = |node: usize| rigid_motions(&positions[node], &centre, size);
+    // Rotations are about the centre, in units of the size.
+    let motions = |node: usize| rigid_motions(&((positions[node] - centre) / size));
     let count = D * (D + 1) / 2;
     // G = Σ m mᵀ over the held degrees of freedom, with m the rigid-body modes there. q·Gq is the held part of a mode q.
     let mut gram = DMatrix::<f64>::zeros(count, count);

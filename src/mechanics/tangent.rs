@@ -15,7 +15,6 @@ use crate::pooled::Pooled;
 use crate::solver::{LinearOperator, Linearization, LocalForm, OnDevice};
 use crate::space::Space;
 use crate::tensor::{Tensor, Vector};
-use num_dual::Dual64;
 use std::sync::Arc;
 
 /// The linearisation K(φ) as an operator.
@@ -29,7 +28,7 @@ use std::sync::Arc;
 /// let coming = simulation.next_step()?;
 /// let (equilibrium, count) = (coming.equilibrium(), coming.nodes().len());
 /// let phi: Vec<_> = direction::<2>(count, 1).iter().map(|x| x * 0.01).collect();
-/// let tangent = equilibrium.tangent(&phi)?;
+/// let tangent = equilibrium.tangent(None, &phi)?;
 /// let times = |u: &[Vector<f64, 2>]| {
 ///     let mut out = vec![Vector::zeros(); u.len()];
 ///     tangent.product(u, &mut out);
@@ -71,7 +70,7 @@ impl<'a, const D: usize> Tangent<'a, D> {
         let extended = self.space.extended_in_pool(u);
         self.data.add_product(&self.mass, extended.as_deref().unwrap_or(u), pressures, out);
         mutant!("unknowns: forces stay at nodes that follow": { return self.space.clear_prescribed(out); });
-        self.space.restrict(out);
+        self.space.followers().restrict(out);
         self.space.clear_prescribed(out);
     }
 
@@ -120,21 +119,13 @@ impl<'a, const D: usize> Tangent<'a, D> {
 }
 
 impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
-    /// Linearises the residual at φ.
+    /// Linearises the residual at φ: one piece, or `None` for the whole.
     ///
     /// Example: [`Tangent`].
     ///
     /// # Errors
     /// det F ≤ 0. The error names the particle with the smallest id.
-    pub fn tangent(&self, phi: &[Vector<f64, D>]) -> Result<Tangent<'_, D>, Inadmissible> {
-        self.tangent_of(None, phi)
-    }
-
-    /// Linearises one piece of the residual at φ, or the whole.
-    ///
-    /// # Errors
-    /// See [`Self::tangent`].
-    pub fn tangent_of(
+    pub fn tangent(
         &self,
         piece: impl Into<Option<Piece>>,
         phi: &[Vector<f64, D>],
@@ -151,39 +142,6 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
         let data = self.terms.linearize(piece, Trial { phi: &self.space.extended(at.phi), ..at })?;
         let has_inertia = !self.step.nodal.is_static();
         Ok(Tangent { mass: self.step.mass(), space: self.space.clone(), data, has_inertia })
-    }
-
-    /// A piece of K u by dual numbers: the derivative of the same piece of the residual, through the same transfer loop.
-    ///
-    /// ```
-    /// use bfree::mechanics::check::direction;
-    /// use bfree::tensor::Vector;
-    ///
-    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
-    /// let simulation = scene.build::<2>("scenes".as_ref())?;
-    /// let coming = simulation.next_step()?;
-    /// let (equilibrium, count) = (coming.equilibrium(), coming.nodes().len());
-    /// let phi: Vec<_> = direction::<2>(count, 1).iter().map(|x| x * 0.01).collect();
-    /// let u = direction::<2>(count, 2);
-    /// for piece in equilibrium.terms.pieces() {
-    ///     let (mut product, dual) = (vec![Vector::zeros(); count], equilibrium.derivative(piece, &phi, &u)?);
-    ///     equilibrium.tangent_of(piece, &phi)?.product(&u, &mut product);
-    ///     let apart = product.iter().zip(&dual).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
-    ///     assert!(apart < 1e-12, "{}: {apart}", piece.name);
-    /// }
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    ///
-    /// # Errors
-    /// See [`Self::tangent`].
-    pub fn derivative(
-        &self,
-        piece: Piece,
-        phi: &[Vector<f64, D>],
-        u: &[Vector<f64, D>],
-    ) -> Result<Vec<Vector<f64, D>>, Inadmissible> {
-        let seeded: Vec<_> = phi.iter().zip(u).map(|(x, d)| x.zip_map(d, Dual64::new)).collect();
-        Ok(self.residual_of(piece, &seeded)?.iter().map(|r| r.map(|x| x.eps)).collect())
     }
 }
 

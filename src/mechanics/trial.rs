@@ -3,7 +3,7 @@
 use crate::tensor::Vector;
 
 /// A trial state of the unknowns.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Trial<'x, T, const D: usize> {
     /// φ, the nodal motion since the last grid reset.
     pub phi: &'x [Vector<T, D>],
@@ -11,14 +11,6 @@ pub(crate) struct Trial<'x, T, const D: usize> {
     /// otherwise empty.
     pub dilatation: &'x [T],
 }
-
-impl<T, const D: usize> Clone for Trial<'_, T, D> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-
-impl<T, const D: usize> Copy for Trial<'_, T, D> {}
 
 impl<'x, T, const D: usize> Trial<'x, T, D> {
     /// A motion that determines the dilatation of the cells.

@@ -326,7 +326,7 @@ mod tests {
         assert!(warning.message.contains("+8.000e-2, 2.0 %"), "{}", warning.message);
         assert!(told(&mut watch, &balance(3.0)).is_empty(), "once");
         assert!(told(&mut watch, &balance(-0.079)).is_empty(), "2 % of 4 are not reached: work does not count");
-        let statics = Settings { scheme: Arc::new(Statics), ..Settings::default() };
+        let statics = Settings { scheme: Arc::new(Statics::default()), ..Settings::default() };
         assert!(told(&mut watch, &Watched { settings: &statics, ..balance(-0.1) }).is_empty(), "without inertia");
         let words = [
             "1.000e-1, 2.5 % of the largest total energy 4.000e0",

@@ -107,16 +107,7 @@ fn record_region(place: &'static Location<'static>, count: usize, task: &(dyn Fn
 /// pool, and at its end that thread wakes the caller.
 ///
 /// A function that must run on its own thread does not belong here: Python's check for Ctrl-C, for example. The pool does not survive `fork`.
-///
-/// ```
-/// use bfree::parallel::in_pool;
-///
-/// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
-/// let mut simulation = scene.build::<2>("scenes".as_ref())?;
-/// assert!(in_pool(|| simulation.advance())?.newton.history.iterations.len() > 1);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-pub fn in_pool<R: Send>(f: impl FnOnce() -> R + Send) -> R {
+pub(crate) fn in_pool<R: Send>(f: impl FnOnce() -> R + Send) -> R {
     rayon::scope(|_| f())
 }
 
@@ -144,7 +135,7 @@ pub(crate) fn for_each_with<P: Send, S: Send + Default>(
     f: &(dyn Fn(&mut S, P) + Sync),
 ) {
     let spare = Mutex::new(Vec::new());
-    for_each(parts, &|part| {
+    collect(parts, &|part| {
         let scratch = held(&spare).pop();
         let mut scratch = scratch.unwrap_or_default();
         f(&mut scratch, part);
@@ -214,8 +205,7 @@ impl<E> First<E> {
     where
         E: Message,
     {
-        let own = self.here();
-        let all = if E::NEVER { vec![own] } else { processes.told(&own) };
+        let all = processes.told(&self.here());
         all.into_iter().flatten().min_by_key(|(number, _)| *number)
     }
 

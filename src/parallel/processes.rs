@@ -6,7 +6,6 @@
 use bytemuck::Pod;
 use nalgebra::SMatrix;
 use num_dual::Dual64;
-use std::convert::Infallible;
 use std::fmt::Debug;
 use std::slice::Iter;
 use std::sync::Arc;
@@ -43,7 +42,7 @@ pub struct Processes(Option<Arc<dyn Exchange>>);
 
 impl Processes {
     /// This process alone.
-    pub const ALONE: Self = Self(None);
+    pub(crate) const ALONE: Self = Self(None);
 
     /// The processes that reach each other in this way.
     pub fn new(exchange: impl Exchange + 'static) -> Self {
@@ -117,14 +116,16 @@ impl Processes {
 
 /// A value that travels between processes as numbers.
 pub trait Message: Sized {
-    /// Whether there is no such value.
-    const NEVER: bool = false;
-
     /// Appends the numbers of the value.
     fn put(&self, to: &mut Vec<f64>);
 
-    /// The value from the next numbers.
+    /// The value from the next numbers. Numbers behind the last are zero.
     fn take(from: &mut Iter<'_, f64>) -> Self;
+
+    /// A value that fills an array before the results are written: the one made of zeros.
+    fn unknown() -> Self {
+        Self::take(&mut [].iter())
+    }
 }
 
 impl Message for f64 {
@@ -133,7 +134,7 @@ impl Message for f64 {
     }
 
     fn take(from: &mut Iter<'_, f64>) -> Self {
-        from.next().copied().unwrap_or(Self::NAN)
+        from.next().copied().unwrap_or_default()
     }
 }
 
@@ -173,21 +174,7 @@ impl Message for () {
     fn take(_: &mut Iter<'_, f64>) -> Self {}
 }
 
-impl Message for Infallible {
-    const NEVER: bool = true;
-
-    fn put(&self, _: &mut Vec<f64>) {
-        match *self {}
-    }
-
-    fn take(_: &mut Iter<'_, f64>) -> Self {
-        unreachable!("no process has such a value")
-    }
-}
-
 impl<M: Message> Message for Option<M> {
-    const NEVER: bool = M::NEVER;
-
     fn put(&self, to: &mut Vec<f64>) {
         self.is_some().put(to);
         self.iter().for_each(|one| one.put(to));
@@ -230,8 +217,6 @@ impl<M: Message + nalgebra::Scalar, const R: usize, const C: usize> Message for 
 }
 
 impl<A: Message, B: Message> Message for (A, B) {
-    const NEVER: bool = A::NEVER || B::NEVER;
-
     fn put(&self, to: &mut Vec<f64>) {
         self.0.put(to);
         self.1.put(to);

@@ -93,7 +93,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             dilatation[1] = at.dilatation.to_vec();
             report
         };
-        equilibrium.space.extend(&mut phi);
+        equilibrium.space.followers().extend(&mut phi);
         Ok(Balance { equilibrium, phi, dilatation, newton, load, cosine })
     }
 

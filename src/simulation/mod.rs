@@ -126,7 +126,7 @@ impl<const D: usize, L, A> Simulation<D, L, A> {
     /// particles.push_without_inertia(Vector::from([1.75]), 0.5, 0.5, 0);
     /// let bodies = vec![Body { name: "bar".into(), law, density: 1.0, dilatation: Default::default(), field: 0 }];
     /// let simulation = Simulation {
-    ///     settings: Settings { scheme: Arc::new(Statics), ..Settings::default() },
+    ///     settings: Settings { scheme: Arc::new(Statics::default()), ..Settings::default() },
     ///     ..Simulation::new(grid, Bspline::Quadratic, bodies, particles, Clock::new(1.0, 0))
     /// };
     /// assert!(simulation.external_work == 0.0 && simulation.loads.prescribed.is_empty());

@@ -308,7 +308,7 @@ impl StepError {
     }
 
     /// Whether the device failed on which linear systems are solved.
-    pub fn is_of_device(&self) -> bool {
+    pub(crate) fn is_of_device(&self) -> bool {
         matches!(self, Self::Newton(error) if error.cause.is_of_device())
     }
 }

@@ -50,7 +50,7 @@ pub struct Settings {
     /// The preconditioner of the linear systems, built anew in each step.
     pub preconditioner: Preconditioning,
     /// The largest allowed local error of a step, in grid spacings: see
-    /// [`Update::local_error`](crate::mechanics::transfer::Update::local_error). A step with a larger error is repeated with half its
+    /// `Update::local_error`. A step with a larger error is repeated with half its
     /// length, as often as the clock allows. The step grows back only when its error is small. `None` for steps of given length, and
     /// without inertia.
     pub error_tolerance: Option<f64>,

@@ -53,22 +53,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
 
     /// The shape functions with [`aggregation`](crate::aggregation), if the settings ask for it: nodes with little support from a body then
     /// follow other nodes.
-    ///
-    /// ```
-    /// use bfree::mechanics::sweep::Supports;
-    ///
-    /// let asked = ["aggregation=true".parse()?];
-    /// let mut simulation = bfree::scene::read_file("scenes/cook.json".as_ref(), &asked)?.build::<2>("scenes".as_ref())?;
-    /// let followers = |of: &bfree::simulation::Simulation<2>| -> Result<_, Box<dyn std::error::Error>> {
-    ///     let (supports, _) = Supports::new(&of.approximation, &of.grid, &of.particles.position)?;
-    ///     Ok(of.aggregated(supports).extension().map_or(0, |extension| extension.len()))
-    /// };
-    /// assert!(followers(&simulation)? > 0);
-    /// simulation.settings.aggregation = false;
-    /// assert_eq!(followers(&simulation)?, 0);
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    pub fn aggregated(&self, supports: Supports<D>) -> Supports<D> {
+    fn aggregated(&self, supports: Supports<D>) -> Supports<D> {
         if !self.settings.aggregation {
             return supports;
         }

@@ -34,20 +34,10 @@ impl<const D: usize, L: Law + 'static, A: ShapeFunction + 'static> Simulation<D,
     /// No equilibrium was found, or a particle would leave the grid. The simulation is then as before the call, except for the order of the
     /// particles in memory.
     pub fn step(&mut self) -> Result<StepReport<D>, StepError> {
-        self.attempt(&mut Spent::nothing())
+        compiled::attempt(self, &mut Spent::nothing())
     }
 
-    /// A step like [`Self::step`]. `spent` counts the work, also if the step fails.
-    fn attempt(&mut self, spent: &mut Spent) -> Result<StepReport<D>, StepError> {
-        // The compiler leaves the other branch away. Unit tests need one dimension or two, and not the steps of all.
-        if const { L::IN_SCENES && A::IN_SCENES && D <= 3 && !cfg!(test) } {
-            compiled::step(self, spent).unwrap_or_else(|| unreachable!("this is the simulation of a scene"))
-        } else {
-            self.attempt_in_this_crate(spent)
-        }
-    }
-
-    /// [`Self::attempt`], compiled where it is called.
+    /// A step like [`Self::step`], compiled where it is called. `spent` counts the work, also if the step fails.
     pub(super) fn attempt_in_this_crate(&mut self, spent: &mut Spent) -> Result<StepReport<D>, StepError> {
         self.particles.make_room_for_internal(&self.bodies);
         let (dt, scheme, watch) = (self.clock.step(), self.settings.scheme.clone(), &mut spent.watch);
@@ -193,7 +183,7 @@ impl<const D: usize, L: Law + 'static, A: ShapeFunction + 'static> Simulation<D,
         loop {
             let (time, dt) = (self.clock.time(), self.clock.step());
             let mut spent = Spent::nothing();
-            let cause = match self.attempt(&mut spent) {
+            let cause = match compiled::attempt(self, &mut spent) {
                 Ok(report) => return Ok(StepReport { failed, ..report }),
                 Err(cause) => cause,
             };

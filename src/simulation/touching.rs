@@ -40,25 +40,7 @@ type Interface = [BTreeSet<usize>; 2];
 
 impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// All pairs of bodies that share nodes.
-    ///
-    /// ```
-    /// use bfree::mechanics::sweep::Supports;
-    ///
-    /// // Two discs that are two spacings apart; then beside each other.
-    /// let scene = bfree::scene::read_file("scenes/collision.json".as_ref(), &[])?;
-    /// let mut simulation = scene.build::<2>("scenes".as_ref())?;
-    /// let shared = |of: &bfree::simulation::Simulation<2>| -> Result<_, Box<dyn std::error::Error>> {
-    ///     Ok(of.shared_nodes(&Supports::new(&of.approximation, &of.grid, &of.particles.position)?.0))
-    /// };
-    /// assert!(shared(&simulation)?.is_empty());
-    /// let particles = &mut simulation.particles;
-    /// particles.position.iter_mut().zip(&particles.body).filter(|(_, body)| **body == 1).for_each(|(x, _)| x[0] -= 2.0);
-    /// let found = shared(&simulation)?;
-    /// assert_eq!((found.len(), found[0].bodies, found[0].tension), (1, [0, 1], None));
-    /// assert!(found[0].gap.is_some_and(|gap| gap.abs() < 1.0));
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    pub fn shared_nodes(&self, supports: &Supports<D>) -> Vec<SharedNodes> {
+    pub(crate) fn shared_nodes(&self, supports: &Supports<D>) -> Vec<SharedNodes> {
         let interfaces = self.interfaces(supports).into_iter();
         let of = |(bodies, sides)| SharedNodes { bodies, gap: self.gap(&sides), tension: self.tension(bodies, &sides) };
         interfaces.map(of).collect()
@@ -148,5 +130,27 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let softer = bodies.map(|body| p_wave_modulus(&self.bodies[body as usize].law));
         let some = NO_STRAIN * softer[0].min(softer[1]);
         Some(normal).filter(|&normal| normal > TENSION * mean && normal > some)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn discs_share_nodes_beside_each_other_and_not_two_spacings_apart() -> Result<(), Box<dyn std::error::Error>> {
+        let scene = crate::scene::read_file("scenes/collision.json".as_ref(), &[])?;
+        let mut simulation = scene.build::<2>("scenes".as_ref())?;
+        let shared = |of: &Simulation<2>| -> Result<_, Box<dyn std::error::Error>> {
+            Ok(of.shared_nodes(&Supports::new(&of.approximation, &of.grid, &of.particles.position)?.0))
+        };
+        assert!(shared(&simulation)?.is_empty());
+        let particles = &mut simulation.particles;
+        let second = particles.position.iter_mut().zip(&particles.body).filter(|(_, body)| **body == 1);
+        second.for_each(|(x, _)| x[0] -= 2.0);
+        let found = shared(&simulation)?;
+        assert_eq!((found.len(), found[0].bodies, found[0].tension), (1, [0, 1], None));
+        assert!(found[0].gap.is_some_and(|gap| gap.abs() < 1.0));
+        Ok(())
     }
 }

@@ -1,7 +1,6 @@
 //! Preconditioned conjugate gradients (Saad, Iterative Methods for Sparse Linear Systems, 2nd ed., alg. 9.1).
 
-use super::{LinearError, LinearOperator, LinearOutcome, LinearReport, begin, finite, true_residual};
-use crate::pooled::Pool;
+use super::{LinearError, LinearOutcome, LinearReport, System, begin, finite};
 use crate::space::vector::{Along, Vectors};
 
 /// A curvature below this multiple of eps times the largest curvature so far is round-off in size and sign.
@@ -10,7 +9,7 @@ const UNRESOLVED: f64 = 16.0;
 /// The iteration ends after n plus this many iterations without a better residual. Exact arithmetic ends at n.
 const PATIENCE: usize = 50;
 
-/// Settings of [`conjugate_gradient`].
+/// Settings of the method of conjugate gradients.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ConjugateGradientSettings {
     /// Wanted ‖b − A x‖ / ‖b‖, in [0, 1).
@@ -19,81 +18,57 @@ pub struct ConjugateGradientSettings {
     pub max_iterations: usize,
 }
 
-/// Solves A x = b from x = 0 for symmetric positive A and M.
-///
-/// 1. r = b − A x, z = M⁻¹ r, p = z.
-/// 2. α = r·z / p·Ap; x ← x + α p, r ← r − α Ap.
-/// 3. z = M⁻¹ r; p ← z + β p with β the ratio of the new r·z to the old.
-/// 4. The curvature is p·Ap / p·Mp, a Rayleigh quotient of M⁻¹A. It is compared with the largest curvature so far. A clearly negative
-///    one ends the iteration as [`LinearOutcome::NegativeCurvature`], a zero up to round-off as [`LinearOutcome::Stagnated`].
-/// 5. When the recurrence meets the tolerance, the residual is computed anew. If the true residual does not meet the tolerance, the
-///    method goes back to 1 as long as this halves the true residual.
-///
-/// The solution is the iterate with the least residual. At negative curvature it is the last iterate. Before the first iterate it is
-/// M⁻¹b divided by the magnitude of its curvature. Along both, ½ x·Ax − b·x falls (Nash, SIAM J. Numer. Anal. 21, 1984; Nocedal and
-/// Wright, Numerical Optimization, 2nd ed., alg. 7.1). `solution` is overwritten, and b = 0 gives x = 0 without iterating.
-/// If A is singular and b lies in its range, x is the solution of least norm x·Mx (least length for M = I). The iteration never leaves
-/// M⁻¹ range(A).
-///
-/// ```
-/// use bfree::pooled::Pool;
-/// use bfree::solver::{ConjugateGradientSettings, Identity, LinearOperator, conjugate_gradient};
-///
-/// /// Two masses on one spring, k = 1: singular, because both may move together.
-/// struct Spring;
-///
-/// impl LinearOperator for Spring {
-///     fn apply(&self, x: &[f64], y: &mut [f64]) {
-///         (y[0], y[1]) = (x[0] - x[1], x[1] - x[0]);
-///     }
-/// }
-///
-/// // Forces in balance pull the masses apart. Of all solutions x₁ − x₀ = 3, the shortest is found.
-/// let mut x = [0.0; 2];
-/// let settings = ConjugateGradientSettings { relative_tolerance: 1e-8, max_iterations: 10 };
-/// let report = conjugate_gradient(&Spring, &Identity, &[-3.0, 3.0], &mut x, &settings, &Pool::default())?;
-/// assert!(report.converged());
-/// assert_eq!(x, [-1.5, 1.5]);
-/// # Ok::<(), bfree::solver::LinearError>(())
-/// ```
-///
-/// # Errors
-/// A setting is out of range, the lengths differ, or a number is NaN or infinite. `solution` then means nothing.
-pub fn conjugate_gradient(
-    operator: &dyn LinearOperator,
-    preconditioner: &dyn LinearOperator,
-    rhs: &[f64],
-    solution: &mut [f64],
-    settings: &ConjugateGradientSettings,
-    workspace: &Pool,
-) -> Result<LinearReport, LinearError> {
-    settings.solve(workspace, operator, preconditioner, rhs, solution)
-}
-
 impl ConjugateGradientSettings {
-    /// [`conjugate_gradient`] where the vectors lie.
+    /// Solves A x = b from x = 0 for symmetric positive A and M.
+    ///
+    /// 1. r = b − A x, z = M⁻¹ r, p = z.
+    /// 2. α = r·z / p·Ap; x ← x + α p, r ← r − α Ap.
+    /// 3. z = M⁻¹ r; p ← z + β p with β the ratio of the new r·z to the old.
+    /// 4. The curvature is p·Ap / p·Mp, a Rayleigh quotient of M⁻¹A. It is compared with the largest curvature so far. A clearly negative
+    ///    one ends the iteration as [`LinearOutcome::NegativeCurvature`], a zero up to round-off as [`LinearOutcome::Stagnated`].
+    /// 5. When the recurrence meets the tolerance, the residual is computed anew. If the true residual does not meet the tolerance, the
+    ///    method goes back to 1 as long as this halves the true residual.
+    ///
+    /// The solution is the iterate with the least residual. At negative curvature it is the last iterate. Before the first iterate it is
+    /// M⁻¹b divided by the magnitude of its curvature. Along both, ½ x·Ax − b·x falls (Nash, SIAM J. Numer. Anal. 21, 1984; Nocedal and
+    /// Wright, Numerical Optimization, 2nd ed., alg. 7.1). `solution` is overwritten, and b = 0 gives x = 0 without iterating.
+    /// If A is singular and b lies in its range, x is the solution of least norm x·Mx (least length for M = I). The iteration never leaves
+    /// M⁻¹ range(A).
+    ///
+    /// ```
+    /// use bfree::pooled::Pool;
+    /// use bfree::solver::{ConjugateGradientSettings, Identity, System};
+    ///
+    /// // Two masses on one spring, k = 1: singular, because both may move together.
+    /// let spring = |x: &[f64], y: &mut [f64]| (y[0], y[1]) = (x[0] - x[1], x[1] - x[0]);
+    /// let system = System { vectors: &Pool::default(), operator: &spring, inverse: &Identity };
+    /// // Forces in balance pull the masses apart. Of all solutions x₁ − x₀ = 3, the shortest is found.
+    /// let mut x = [0.0; 2];
+    /// let settings = ConjugateGradientSettings { relative_tolerance: 1e-8, max_iterations: 10 };
+    /// let report = settings.solve(&system, &[-3.0, 3.0], &mut x)?;
+    /// assert!(report.converged());
+    /// assert_eq!(x, [-1.5, 1.5]);
+    /// # Ok::<(), bfree::solver::LinearError>(())
+    /// ```
     ///
     /// # Errors
-    /// See [`conjugate_gradient`].
+    /// A setting is out of range, the lengths differ, or a number is NaN or infinite. `solution` then means nothing.
     pub fn solve<S: Vectors>(
         &self,
-        vectors: &S,
-        operator: &dyn LinearOperator<S::Vector>,
-        preconditioner: &dyn LinearOperator<S::Vector>,
+        system: &System<'_, S>,
         rhs: &S::Vector,
         solution: &mut S::Vector,
     ) -> Result<LinearReport, LinearError> {
-        let (mut report, b_norm) = begin(vectors, rhs, solution, self.relative_tolerance)?;
+        let (mut report, b_norm) = begin(system.vectors, rhs, solution, self.relative_tolerance)?;
         if b_norm == 0.0 {
             return Ok(report);
         }
         let target = self.relative_tolerance * b_norm;
-        let mut r = vectors.copied(rhs);
+        let mut r = system.vectors.copied(rhs);
         let mut r_norm = b_norm;
-        let system = System { vectors, operator, preconditioner, target, max_iterations: self.max_iterations };
         loop {
-            let ended = system.descend(&mut r, solution, &mut report)?;
-            let reached = true_residual(vectors, operator, rhs, solution, &mut r, &mut report)?;
+            let ended = self.descend(system, target, &mut r, solution, &mut report)?;
+            let reached = system.true_residual(rhs, solution, &mut r, &mut report)?;
             report.relative_residual = reached / b_norm;
             report.outcome = match ended {
                 _ if reached <= target => LinearOutcome::Converged,
@@ -108,30 +83,20 @@ impl ConjugateGradientSettings {
             return Ok(report);
         }
     }
-}
 
-/// A system, and where its iteration ends.
-struct System<'a, S: Vectors> {
-    vectors: &'a S,
-    operator: &'a dyn LinearOperator<S::Vector>,
-    preconditioner: &'a dyn LinearOperator<S::Vector>,
-    target: f64,
-    max_iterations: usize,
-}
-
-impl<S: Vectors> System<'_, S> {
-    /// Steps 1 to 4 from the residual `r`, counted in `report`. Leaves the best iterate in `solution`.
-    fn descend(
+    /// Steps 1 to 4 from the residual `r`, down to the norm `target`, counted in `report`. Leaves the best iterate in `solution`.
+    fn descend<S: Vectors>(
         &self,
+        &System { vectors, operator, inverse }: &System<'_, S>,
+        target: f64,
         r: &mut S::Vector,
         solution: &mut S::Vector,
         report: &mut LinearReport,
     ) -> Result<LinearOutcome, LinearError> {
-        let &Self { vectors, operator, preconditioner, target, max_iterations } = self;
         let mut iterates = Iterates::new(vectors, solution);
         let n = vectors.len(r);
         let (mut z, mut q) = (vectors.zeros(n), vectors.zeros(n));
-        preconditioner.apply(r, &mut z);
+        inverse.apply(r, &mut z);
         let mut p = vectors.copied(&z);
         let mut rz = vectors.dot(r, &z);
         // p·Mp, by recurrence: Mp = r + β Mp_old and z·Mp_old = r·p_old = 0.
@@ -140,7 +105,8 @@ impl<S: Vectors> System<'_, S> {
         let (mut best, mut best_at) = (vectors.norm(r), report.iterations);
         loop {
             let at = report.iterations;
-            if let Some(outcome) = ends(finite(rz, "r·z", at)?, at >= max_iterations, at - best_at > n + PATIENCE) {
+            if let Some(outcome) = ends(finite(rz, "r·z", at)?, at >= self.max_iterations, at - best_at > n + PATIENCE)
+            {
                 vectors.copy(iterates.best(), solution);
                 return Ok(outcome);
             }
@@ -169,7 +135,7 @@ impl<S: Vectors> System<'_, S> {
                     return Ok(LinearOutcome::Converged);
                 }
             }
-            preconditioner.apply(r, &mut z);
+            inverse.apply(r, &mut z);
             let rz_new = vectors.dot(r, &z);
             let β = rz_new / rz;
             mutant!("solver: the inverse of β in conjugate gradients": β = 1.0 / β);
@@ -243,9 +209,10 @@ fn unusable(curvature: f64, largest: &mut f64) -> Option<LinearOutcome> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Identity;
     use super::super::testing::{Dense, distance, irregular};
+    use super::super::{Identity, LinearOperator};
     use super::*;
+    use crate::pooled::Pool;
     use crate::space::vector::{dot, norm};
 
     /// Solves with a memory pool of its own.
@@ -256,7 +223,7 @@ mod tests {
         solution: &mut [f64],
         settings: &ConjugateGradientSettings,
     ) -> Result<LinearReport, LinearError> {
-        super::conjugate_gradient(operator, preconditioner, rhs, solution, settings, &Pool::default())
+        settings.solve(&System { vectors: &Pool::default(), operator, inverse: preconditioner }, rhs, solution)
     }
 
     const TIGHT: ConjugateGradientSettings =

@@ -11,18 +11,16 @@ mod nonnegative;
 mod preconditioner;
 mod stop;
 
-pub use conjugate_gradient::{ConjugateGradientSettings, conjugate_gradient};
+pub use conjugate_gradient::ConjugateGradientSettings;
 pub use forcing::Forcing;
-pub use gmres::{GmresSettings, gmres};
+pub use gmres::GmresSettings;
 pub use newton::{
     Convergence, Krylov, LinearSolverFailure, Merit, NewtonCounts, NewtonError, NewtonFailure, NewtonHistory,
     NewtonIteration, NewtonReport, NewtonSettings, newton,
 };
 pub(crate) use nonnegative::NonnegativeLeastSquares;
-pub use preconditioner::{
-    BlockJacobi, Identity, LocalForm, Multigrid, Preconditioner, Preconditioning, PressureCells, Saddle,
-};
-pub(crate) use preconditioner::{multigrid_bytes, saddle_bytes};
+pub use preconditioner::{BlockJacobi, Identity, LocalForm, Multigrid, Preconditioner, Preconditioning, PressureCells};
+pub(crate) use preconditioner::{Saddle, multigrid_bytes, rigid_motions, saddle_bytes};
 pub use stop::Stop;
 
 use crate::gpu::{Gpu, GpuVector};
@@ -59,10 +57,22 @@ pub trait LinearOperator<V: ?Sized = [f64]> {
     fn apply(&self, x: &V, y: &mut V);
 }
 
-impl<V: ?Sized, T: LinearOperator<V> + ?Sized> LinearOperator<V> for &T {
+/// A function `(x, y)` that writes y = A x.
+impl<V: ?Sized, F: Fn(&V, &mut V)> LinearOperator<V> for F {
     fn apply(&self, x: &V, y: &mut V) {
-        (**self).apply(x, y);
+        self(x, y);
     }
+}
+
+/// A linear operator A with an approximate inverse M⁻¹, and the place of their vectors. Krylov methods solve with it.
+#[derive(Clone, Copy)]
+pub struct System<'a, S: Vectors> {
+    /// The place of the vectors.
+    pub vectors: &'a S,
+    /// A
+    pub operator: &'a dyn LinearOperator<S::Vector>,
+    /// M⁻¹, the preconditioner.
+    pub inverse: &'a dyn LinearOperator<S::Vector>,
 }
 
 /// The linearisation of a residual at one x: its product with a vector, and the data for preconditioners.
@@ -234,19 +244,13 @@ impl LinearReport {
     ///
     /// ```
     /// use bfree::pooled::Pool;
-    /// use bfree::solver::{ConjugateGradientSettings, Identity, LinearOperator, LinearOutcome, conjugate_gradient};
+    /// use bfree::solver::{ConjugateGradientSettings, Identity, LinearOutcome, System};
     ///
-    /// /// A mirror, with the eigenvalues 1 and −1: not positive definite.
-    /// struct Mirror;
-    ///
-    /// impl LinearOperator for Mirror {
-    ///     fn apply(&self, x: &[f64], y: &mut [f64]) {
-    ///         (y[0], y[1]) = (x[0], -x[1]);
-    ///     }
-    /// }
-    ///
+    /// // A mirror, with the eigenvalues 1 and −1: not positive definite.
+    /// let mirror = |x: &[f64], y: &mut [f64]| (y[0], y[1]) = (x[0], -x[1]);
+    /// let system = System { vectors: &Pool::default(), operator: &mirror, inverse: &Identity };
     /// let settings = ConjugateGradientSettings { relative_tolerance: 1e-8, max_iterations: 10 };
-    /// let report = conjugate_gradient(&Mirror, &Identity, &[1.0, 2.0], &mut [0.0; 2], &settings, &Pool::default())?;
+    /// let report = settings.solve(&system, &[1.0, 2.0], &mut [0.0; 2])?;
     /// assert!(!report.converged());
     /// assert_eq!(report.outcome, LinearOutcome::NegativeCurvature);
     /// # Ok::<(), bfree::solver::LinearError>(())
@@ -342,23 +346,24 @@ fn finite(value: f64, what: &'static str, iteration: usize) -> Result<f64, Linea
     if value.is_finite() { Ok(value) } else { Err(LinearError::NotFinite { what, iteration }) }
 }
 
-/// `r = b − A x`, and its norm. Counts the product.
-///
-/// # Errors
-/// x or r is not finite.
-fn true_residual<S: Vectors>(
-    vectors: &S,
-    operator: &dyn LinearOperator<S::Vector>,
-    rhs: &S::Vector,
-    x: &S::Vector,
-    r: &mut S::Vector,
-    report: &mut LinearReport,
-) -> Result<f64, LinearError> {
-    finite(vectors.norm(x), "the norm of the solution", report.iterations)?;
-    operator.apply(x, r);
-    report.products += 1;
-    vectors.xpby(rhs, -1.0, r);
-    finite(vectors.norm(r), "the norm of the residual", report.iterations)
+impl<S: Vectors> System<'_, S> {
+    /// `r = b − A x`, and its norm. Counts the product.
+    ///
+    /// # Errors
+    /// x or r is not finite.
+    fn true_residual(
+        &self,
+        rhs: &S::Vector,
+        x: &S::Vector,
+        r: &mut S::Vector,
+        report: &mut LinearReport,
+    ) -> Result<f64, LinearError> {
+        finite(self.vectors.norm(x), "the norm of the solution", report.iterations)?;
+        self.operator.apply(x, r);
+        report.products += 1;
+        self.vectors.xpby(rhs, -1.0, r);
+        finite(self.vectors.norm(r), "the norm of the residual", report.iterations)
+    }
 }
 
 #[cfg(test)]

@@ -52,11 +52,6 @@ impl<const D: usize> Space<D> {
         self.entries() - self.prescribed.len() - following
     }
 
-    /// √(Σ |a_I|²)
-    pub(crate) fn norm(&self, a: &[Vector<f64, D>]) -> f64 {
-        vector::norm(bytemuck::cast_slice(a))
-    }
-
     /// The prescribed values: (node, component).
     pub(crate) fn prescribed(&self) -> &[(usize, usize)] {
         &self.prescribed
@@ -67,16 +62,11 @@ impl<const D: usize> Space<D> {
         &self.followers
     }
 
-    /// u = E û, in place.
-    pub(crate) fn extend<T: Real + Send + Sync>(&self, field: &mut [Vector<T, D>]) {
-        self.followers.extend(field);
-    }
-
     /// E û
     pub(crate) fn extended<'b, T: Real + Send + Sync>(&self, field: &'b [Vector<T, D>]) -> Cow<'b, [Vector<T, D>]> {
         let mut field = Cow::Borrowed(field);
         if !self.followers.is_empty() {
-            self.extend(field.to_mut());
+            self.followers.extend(field.to_mut());
         }
         field
     }
@@ -88,18 +78,8 @@ impl<const D: usize> Space<D> {
         }
         let mut extended = self.pool.unspecified(field.len(), Vector::zeros());
         parallel::zip(&mut extended, field, |extended, u| *extended = *u);
-        self.extend(&mut extended);
+        self.followers.extend(&mut extended);
         Some(extended)
-    }
-
-    /// R̂ = Eᵀ R, in place. Values that follow become zero.
-    pub(crate) fn restrict<T: Real + Send + Sync>(&self, forces: &mut [Vector<T, D>]) {
-        self.followers.restrict(forces);
-    }
-
-    /// |E|ᵀ applied to round-off bounds, in place.
-    pub(crate) fn restrict_magnitudes<T: Real + Send + Sync>(&self, magnitudes: &mut [Vector<T, D>]) {
-        self.followers.restrict_magnitudes(magnitudes);
     }
 
     /// Sets the prescribed values to zero.

@@ -1,23 +1,25 @@
 //! Operations on long vectors. The results do not depend on the number of threads.
 //!
 //! A reduction is cut into chunks of fixed length. The sums of the chunks are added in the order of the chunks, whichever thread made them.
-//! Every function takes vectors of one length; if lengths differ, the shorter one counts. [`dot`] does not scale its products, so its
-//! entries should be zero or lie between 1e-150 and 1e150 in magnitude. [`norm`] takes entries of any magnitude.
+//! Every function takes vectors of one length; if lengths differ, the shorter one counts. [`Vectors::dot`] does not scale its products, so its
+//! entries should be zero or lie between 1e-150 and 1e150 in magnitude. [`Vectors::norm`] takes entries of any magnitude.
 //!
 //! ```
-//! use bfree::space::vector::{axpy, dot, norm, scaled, xpby};
+//! use bfree::pooled::Pool;
+//! use bfree::space::vector::Vectors;
 //!
+//! let memory = Pool::default();
 //! // One step of Gram and Schmidt: the remainder of y is orthogonal to x.
 //! let (mut x, mut y) = (vec![0.0; 3], vec![2.0, 1.0, 5.0]);
-//! scaled(1.0 / norm(&[1.0, 2.0, 2.0]), &[1.0, 2.0, 2.0], &mut x);
-//! let along = dot(&x, &y);
-//! axpy(-along, &x, &mut y);
-//! assert!((norm(&x) - 1.0).abs() < 1e-15 && dot(&x, &y).abs() < 1e-14);
+//! memory.scaled(1.0 / memory.norm(&[1.0, 2.0, 2.0]), &[1.0, 2.0, 2.0], &mut x);
+//! let along = memory.dot(&x, &y);
+//! memory.axpy(-along, &x, &mut y);
+//! assert!((memory.norm(&x) - 1.0).abs() < 1e-15 && memory.dot(&x, &y).abs() < 1e-14);
 //! // y ← x + β y, the next direction of conjugate gradients
-//! xpby(&x, 0.5, &mut y);
-//! assert!((dot(&x, &y) - 1.0).abs() < 1e-14);
+//! memory.xpby(&x, 0.5, &mut y);
+//! assert!((memory.dot(&x, &y) - 1.0).abs() < 1e-14);
 //! // Nothing overflows: ‖(3, 4)·1e200‖ = 5e200
-//! assert!((norm(&[3e200, 4e200]) / 5e200 - 1.0).abs() < 1e-15);
+//! assert!((memory.norm(&[3e200, 4e200]) / 5e200 - 1.0).abs() < 1e-15);
 //! ```
 
 use crate::parallel;
@@ -131,15 +133,15 @@ impl Vectors for Pool {
     }
 
     fn axpy(&self, a: f64, x: &[f64], y: &mut [f64]) {
-        axpy(a, x, y);
+        update(x, y, |x, y| a * x + y);
     }
 
     fn xpby(&self, x: &[f64], b: f64, y: &mut [f64]) {
-        xpby(x, b, y);
+        update(x, y, |x, y| x + b * y);
     }
 
     fn scaled(&self, a: f64, x: &[f64], y: &mut [f64]) {
-        scaled(a, x, y);
+        update(x, y, |x, _| a * x);
     }
 
     fn divided(&self, x: &[f64], a: f64, y: &mut [f64]) {
@@ -175,7 +177,7 @@ const PARALLEL: usize = 8 * CHUNK;
 const LANES: usize = 8;
 
 /// `Σ xᵢ yᵢ`
-pub fn dot(x: &[f64], y: &[f64]) -> f64 {
+pub(crate) fn dot(x: &[f64], y: &[f64]) -> f64 {
     if x.len() < PARALLEL {
         x.chunks(CHUNK).zip(y.chunks(CHUNK)).map(|(x, y)| dot_chunk(x, y)).sum()
     } else {
@@ -199,7 +201,7 @@ fn dot_chunk(x: &[f64], y: &[f64]) -> f64 {
 const SAFE_SQUARE: f64 = 1e-280;
 
 /// `√(Σ xᵢ²)`; not finite if any entry is not.
-pub fn norm(x: &[f64]) -> f64 {
+pub(crate) fn norm(x: &[f64]) -> f64 {
     norm_with(dot(x, x), x)
 }
 
@@ -223,21 +225,6 @@ pub(crate) fn norm_with(square: f64, x: &[f64]) -> f64 {
     let (half, rest) = (2.0_f64.powi(-(k / 2)), 2.0_f64.powi(-(k - k / 2)));
     let scaled: Vec<f64> = x.iter().map(|x| x * half * rest).collect();
     dot(&scaled, &scaled).sqrt() / half / rest
-}
-
-/// `y ← a x + y`
-pub fn axpy(a: f64, x: &[f64], y: &mut [f64]) {
-    update(x, y, |x, y| a * x + y);
-}
-
-/// `y ← x + b y`
-pub fn xpby(x: &[f64], b: f64, y: &mut [f64]) {
-    update(x, y, |x, y| x + b * y);
-}
-
-/// `y ← a x`
-pub fn scaled(a: f64, x: &[f64], y: &mut [f64]) {
-    update(x, y, |x, _| a * x);
 }
 
 /// `yᵢ ← f(xᵢ, yᵢ)`
@@ -286,7 +273,7 @@ mod tests {
         for threads in [1, 2, 3] {
             let (shared, added) = parallel::with_threads(threads, || {
                 let mut z = y.clone();
-                axpy(0.1, &x, &mut z);
+                Pool::default().axpy(0.1, &x, &mut z);
                 (dot(&x, &y), z)
             });
             assert_eq!(shared.to_bits(), sequential.to_bits(), "{threads} threads");
@@ -301,9 +288,9 @@ mod tests {
             let x: Vec<f64> = (1..=n).map(|i| i as f64).collect();
             assert_eq!(dot(&x, &vec![1.0; n]), (n * (n + 1) / 2) as f64, "{n}");
             let mut y = x.clone();
-            xpby(&x, 2.0, &mut y);
+            Pool::default().xpby(&x, 2.0, &mut y);
             assert!(y.iter().zip(&x).all(|(y, x)| *y == 3.0 * x), "{n}");
-            scaled(-2.0, &x, &mut y);
+            Pool::default().scaled(-2.0, &x, &mut y);
             assert!(y.iter().zip(&x).all(|(y, x)| *y == -2.0 * x), "{n}");
         }
     }

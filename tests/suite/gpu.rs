@@ -188,7 +188,7 @@ fn compare_products<const D: usize>(gpu: &Arc<Gpu>, case: usize) -> Result<(), F
     let phi: Vec<_> = direction::<D>(count, 1).iter().map(|x| x * 0.01).collect();
     let mut u = direction::<D>(count, 2);
     coming.prescribed().iter().for_each(|dof| u[dof.node][dof.component] = 0.0);
-    let tangent = equilibrium.tangent(&phi)?;
+    let tangent = equilibrium.tangent(None, &phi)?;
     let mut expected = vec![Vector::zeros(); count];
     tangent.product(&u, &mut expected);
     let on_device = tangent.on_device().ok_or("no device")?;

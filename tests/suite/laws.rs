@@ -95,7 +95,7 @@ fn results<const D: usize, L: Law>(
     let (same, apart) = (bits(&real) == bits(&residual), difference(&real, &residual));
     assert!(same || divides && apart < 1e-14, "the real part of dual numbers: {apart:e}");
     equilibrium.check_tangent(dphi, u)?;
-    let tangent = equilibrium.tangent(dphi)?;
+    let tangent = equilibrium.tangent(None, dphi)?;
     let mut product = vec![Vector::zeros(); u.len()];
     tangent.product(u, &mut product);
     Ok(Results { residual, product, blocks: tangent.diagonal_blocks().to_vec() })
@@ -222,6 +222,6 @@ fn fails<L: Law>(
         equilibrium.residual(&zero.iter().map(|x| x.map(Dual64::from)).collect::<Vec<_>>()).err(),
         Some(expected)
     );
-    assert_eq!(equilibrium.tangent(zero).err(), Some(expected));
+    assert_eq!(equilibrium.tangent(None, zero).err(), Some(expected));
     assert_eq!(equilibrium.potential(zero).map(|found| found.map(|_| ())), Some(Err(expected)));
 }

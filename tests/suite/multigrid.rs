@@ -126,7 +126,7 @@ fn a_cycle_is_symmetric_and_positive() -> Result<(), Failure> {
     let (nodal, prescribed) = (Nodal::at_rest(&simulation.particles, &supports), simulation.prescribed(&nodes));
     let equilibrium = simulation.equilibrium(&supports, &nodal, &prescribed, simulation.settings.scheme.end(0.2), 0.2);
     let at_rest = vec![Default::default(); nodes.len()];
-    let tangent = equilibrium.tangent(&at_rest)?;
+    let tangent = equilibrium.tangent(None, &at_rest)?;
     let mut multigrid = Multigrid::<2>::default();
     let inverse = multigrid.prepare(&tangent);
     // r, for a direction that leaves prescribed nodes alone, and z = M⁻¹ r.

@@ -3,7 +3,7 @@
 
 use crate::support::{Failure, Said, built, merged, said, scene, solid};
 use bfree::mechanics::check::direction;
-use bfree::mechanics::sweep::{Points, Supports, Weights};
+use bfree::mechanics::sweep::{Mode, Points, Supports};
 use bfree::parallel::{Exchange, Processes};
 use bfree::plan::{Plan, ProcessUse};
 use bfree::pooled::Pool;
@@ -11,7 +11,6 @@ use bfree::simulation::{Simulation, StepReport};
 use bfree::tensor::Vector;
 use serde_json::json;
 use std::collections::BTreeMap;
-use std::convert::Infallible;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::Arc;
@@ -195,8 +194,7 @@ fn a_scatter_is_one_message_of_the_planned_length() -> Result<(), Failure> {
             let (supports, _) = Supports::rebuilt(None, approximation, &start.grid, &points, &pool).unwrap();
             counts.iter().for_each(|one| one.store(0, Ordering::Relaxed));
             let mut force = vec![Vector::zeros(); nodes];
-            let unit = |_, u, l| Ok::<_, Infallible>((u, l));
-            supports.assemble(&direction::<3>(nodes, 1), Weights::Signed, &mut force, unit).unwrap();
+            supports.sweep(Some(&direction::<3>(nodes, 1)), Mode::BOTH, &mut force, |_, at, sums| *sums = *at);
             [0, 1].map(|which| counts[which].load(Ordering::Relaxed))
         };
         let all = thread::scope(|scope| {

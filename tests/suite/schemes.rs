@@ -4,7 +4,6 @@ use crate::support::{Failure, advance, run_to, scene};
 use bfree::mechanics::schemes::{Alphas, Newmark, Scheme};
 use bfree::simulation::Simulation;
 use bfree::tensor::Vector;
-use std::fmt::{Display, Formatter};
 use std::sync::Arc;
 
 const FALL: &[&str] = &["gravity={\"acceleration\":[0,-0.01]}", "time.beta=null", "time.gamma=null"];
@@ -96,13 +95,11 @@ fn it_damps_what_steps_do_not_resolve() -> Result<(), Failure> {
 #[derive(Debug)]
 struct BackwardEuler;
 
-impl Display for BackwardEuler {
-    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
-        f.write_str("backward Euler")
-    }
-}
-
 impl Scheme for BackwardEuler {
+    fn name(&self) -> String {
+        "backward Euler".into()
+    }
+
     /// v = Δφ/Δt, a = (v − v_n)/Δt
     fn end(&self, dt: f64) -> Alphas {
         Alphas { dt, a1: 1.0 / (dt * dt), a2: 1.0 / dt, a3: 0.0, a4: 1.0 / dt, a6: 0.0, discrete_gradient: false }

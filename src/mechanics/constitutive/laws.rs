@@ -108,7 +108,7 @@ impl<const D: usize, L: Law> Laws<'_, D, L> {
     ) -> impl Fn(Group<'_>, &At<T, D, D>, &mut At<T, D, D>) -> Result<(), Inadmissible> + Sync {
         // The loops of shipped laws are compiled for plain numbers. `downcast` finds out whether T is the plain number.
         let in_lanes = |law: &L| {
-            let shipped: Box<dyn Any> = Box::new(shipped(material(law)?, D, Quantity::Stress));
+            let shipped: Box<dyn Any> = Box::new(shipped(material(law)?, D, None));
             shipped.downcast::<Box<Evaluation<'static, T>>>().ok()
         };
         let of_body = self.evaluations(|law, averages| match in_lanes(law) {
@@ -159,9 +159,7 @@ impl<const D: usize, L: Law> Laws<'_, D, L> {
                     det_f,
                 );
             }),
-            Some(material) if part == Part::Whole && form != Form::General => {
-                shipped(material, D, Quantity::Tangent(form))
-            }
+            Some(material) if part == Part::Whole && form != Form::General => shipped(material, D, Some(form)),
             _ => Box::new(move |states, out, det_f| {
                 tangents_of::<D>(|_, at, g, v| point::linearize(law, at, g, v, part), states, form, out, det_f);
             }),
@@ -323,39 +321,33 @@ fn write_upper<const D: usize>(a: &[[f64; D]; D], out: &mut ClosedRows, first: u
     }
 }
 
-/// The quantity that is evaluated of a law in every lane.
-#[derive(Clone, Copy)]
-enum Quantity {
-    Stress,
-    Tangent(Form),
-}
-
-/// The evaluation of a shipped law, in vector lanes. It is not generic, so it is compiled here and not by every crate that uses it.
+/// The evaluation of a shipped law, in vector lanes: its tangent in a form, or without a form its stress. The function is not generic, so it
+/// is compiled here and not by every crate that uses it.
 #[inline(never)]
-fn shipped(law: &Material, dimension: usize, quantity: Quantity) -> Box<Evaluation<'static, f64>> {
+fn shipped(law: &Material, dimension: usize, form: Option<Form>) -> Box<Evaluation<'static, f64>> {
     match dimension {
-        1 => law.with(InLanes::<1>(quantity)),
-        2 => law.with(InLanes::<2>(quantity)),
-        _ => law.with(InLanes::<3>(quantity)),
+        1 => law.with(InLanes::<1>(form)),
+        2 => law.with(InLanes::<2>(form)),
+        _ => law.with(InLanes::<3>(form)),
     }
 }
 
 /// Makes the evaluation of a law in D dimensions.
-struct InLanes<const D: usize>(Quantity);
+struct InLanes<const D: usize>(Option<Form>);
 
 impl<const D: usize> LawVisitor for InLanes<D> {
     type Output = Box<Evaluation<'static, f64>>;
 
     fn visit<L: Law + 'static>(self, law: L) -> Self::Output {
         Box::new(move |states, out, det_f| {
-            widest(Evaluate::<L, D> { law: &law, quantity: self.0, states, out, det_f });
+            widest(Evaluate::<L, D> { law: &law, form: self.0, states, out, det_f });
         })
     }
 }
 
 struct Evaluate<'a, L, const D: usize> {
     law: &'a L,
-    quantity: Quantity,
+    form: Option<Form>,
     states: &'a States<'a, f64>,
     out: &'a mut [[f64; LANES]],
     det_f: &'a mut [f64; LANES],
@@ -364,12 +356,12 @@ struct Evaluate<'a, L, const D: usize> {
 impl<L: Law, const D: usize> WithLanes for Evaluate<'_, L, D> {
     #[inline(always)]
     fn run<S: Lanes>(self, _: S) {
-        let Self { law, quantity, states, out, det_f } = self;
-        match quantity {
-            Quantity::Stress => {
+        let Self { law, form, states, out, det_f } = self;
+        match form {
+            None => {
                 stresses_of::<f64, D>(|_, at, g, v| point::internal(law, at, g, v, Part::Whole), states, out, det_f);
             }
-            Quantity::Tangent(form) => {
+            Some(form) => {
                 tangents_of::<D>(|_, at, g, v| point::linearize(law, at, g, v, Part::Whole), states, form, out, det_f);
             }
         }

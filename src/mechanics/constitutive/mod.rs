@@ -12,6 +12,6 @@ mod point;
 mod tangents;
 
 pub(super) use discrete_gradient::{GAUSS, ROUND_OFF};
-pub use laws::Laws;
+pub(crate) use laws::Laws;
 pub use point::Part;
 pub(crate) use tangents::{AddTo, Form, Product, add_quadratic, general, product};

@@ -1,12 +1,11 @@
 //! The linearised tangent of averaged cells, as rows of numbers.
 
-use super::{Along, FunctionsAt};
+use super::{Along, FunctionsAt, Rows};
 use crate::gpu::{self, Gpu};
 use crate::lanes::LANES;
-use crate::mechanics::constitutive::{AddTo, Form, Product, add_quadratic, product};
+use crate::mechanics::constitutive::Form;
 use crate::mechanics::dilatation::{Cells, Member, Scale};
-use crate::mechanics::sweep::{At, Group, Quadratic, Supports};
-use crate::pooled::Pooled;
+use crate::mechanics::sweep::{At, Group, Supports};
 use crate::tensor::{Tensor, Vector};
 use std::sync::Arc;
 
@@ -41,7 +40,8 @@ impl CellLayout {
 pub(crate) struct CellRows<const D: usize> {
     cells: Arc<Cells>,
     layout: CellLayout,
-    rows: Arc<Pooled<[f64; LANES]>>,
+    /// 𝔸, a and b.
+    pub rows: Rows,
     /// k of every cell; in the mixed form γ.
     pub stiffness: Vec<f64>,
     /// The cells of the mixed form.
@@ -91,7 +91,8 @@ impl<const D: usize> CellRows<D> {
                 }
             }
         });
-        Self { cells, layout, rows: Arc::new(rows), stiffness, mixed: None }
+        let rows = Rows::new(layout.form, 0, layout.count, rows);
+        Self { cells, layout, rows, stiffness, mixed: None }
     }
 
     /// The cells times a factor, where 𝔸 is zero.
@@ -100,16 +101,10 @@ impl<const D: usize> CellRows<D> {
         self
     }
 
-    /// The numbers of a group.
-    #[inline(always)]
-    fn of_group(&self, group: usize) -> &[[f64; LANES]] {
-        &self.rows[group * self.layout.count..][..self.layout.count]
-    }
-
     /// The tensor at `first` of a member.
     fn tensor(&self, member: &Member, first: usize) -> Tensor<f64, D> {
         let (group, lane) = (member.slot as usize / LANES, member.slot as usize % LANES);
-        let rows = self.of_group(group);
+        let rows = self.rows.of_group(group);
         Tensor::from_fn(|i, k| rows[first + i * D + k][lane])
     }
 
@@ -136,9 +131,7 @@ impl<const D: usize> CellRows<D> {
             changes: gpu.memory_for(self.stiffness.len()),
             stiffness: gpu.copy_of(&self.stiffness),
         };
-        let rows = Arc::new(gpu.copy_of(self.rows.as_flattened()));
-        let (form, count) = (self.layout.form as i32, self.layout.count);
-        gpu::Rows { rows, factor: 1.0, form, count, cells: Some(cells) }
+        gpu::Rows { cells: Some(cells), ..self.rows.on_device(gpu) }
     }
 
     /// δp of every cell: as given in the mixed form, or k δv.
@@ -158,7 +151,7 @@ impl<const D: usize> CellRows<D> {
     pub(crate) fn volume_changes(&self, supports: &Supports<D>, u: &[Vector<f64, D>]) -> Vec<f64> {
         let mut grown = supports.pool().unspecified(supports.groups(), [0.0; LANES]);
         supports.fill_all_rows(u, 1, &mut grown, |group, at, grown| {
-            let b = &self.of_group(group.number)[self.layout.b..];
+            let b = &self.rows.of_group(group.number)[self.layout.b..];
             grown[0] = [0.0; LANES];
             for (b, l) in b.iter().zip(at.gradient.as_flattened()) {
                 (0..LANES).for_each(|lane| grown[0][lane] += b[lane] * l[lane]);
@@ -169,22 +162,16 @@ impl<const D: usize> CellRows<D> {
 
     #[inline(always)]
     pub(crate) fn add_product(&self, changes: &[f64], group: Group<'_>, at: &At<f64, D, D>, sums: &mut At<f64, D, D>) {
-        let (rows, form) = (self.of_group(group.number), self.layout.form);
+        self.rows.add_product(group, at, sums);
         let mut pressures = [0.0; LANES];
         for (lane, &p) in group.particles.iter().enumerate() {
             pressures[lane] = self.cells.cell(p).map_or(0.0, |cell| changes[cell]);
             mutant!("mean dilatation: the product lacks the coupling within a cell": { pressures[lane] = 0.0; });
         }
-        let out = sums.gradient.as_flattened_mut();
-        product(D, Product { form, rows: &rows[..form.rows(D)], l: at.gradient.as_flattened(), out });
-        for (out, a) in out.iter_mut().zip(&rows[self.layout.a..]) {
+        let a = &self.rows.of_group(group.number)[self.layout.a..];
+        for (out, a) in sums.gradient.as_flattened_mut().iter_mut().zip(a) {
             (0..LANES).for_each(|lane| out[lane] += pressures[lane] * a[lane]);
         }
-    }
-
-    pub(crate) fn add_quadratic(&self, group: Group<'_>, into: &mut Quadratic) {
-        let form = self.layout.form;
-        add_quadratic(D, AddTo { form, rows: &self.of_group(group.number)[..form.rows(D)], factor: 1.0, into });
     }
 
     /// Calls `visit` with each cell, each node that moves it, a_I = Σ a ∇_r N_I and b_I = Σ b ∇_r N_I.

@@ -8,7 +8,7 @@ use crate::tensor::{Tensor, Vector};
 use std::collections::BTreeMap;
 
 /// The points in contact.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct ContactRows<const D: usize> {
     rows: Vec<ContactRow<D>>,
     /// For each point, the end of its nodes in `weights`.
@@ -27,12 +27,6 @@ pub(crate) struct ContactRow<const D: usize> {
     pub tangent: Tensor<f64, D>,
     /// The number of the free obstacle that the point touches, and how both depend on each other.
     pub on_free: Option<(usize, FreePoint<D>)>,
-}
-
-impl<const D: usize> Default for ContactRows<D> {
-    fn default() -> Self {
-        Self { rows: Vec::new(), ends: Vec::new(), weights: Vec::new(), obstacles: 0 }
-    }
 }
 
 impl<const D: usize> ContactRows<D> {

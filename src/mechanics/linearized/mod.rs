@@ -3,7 +3,7 @@
 //! | array | entries | its part of K u |
 //! |---|---|---|
 //! | α M̃ | nodes, particles | α (ε m_I u_I + Σ_p (1 − ε) m_p u_p N_I) |
-//! | [`StressRows`] | particles | Σ_p (𝔸 : L) ∇_r N_I |
+//! | [`Rows`] | particles | Σ_p (𝔸 : L) ∇_r N_I |
 //! | [`CellRows`] | particles, averaged cells | Σ_p (𝔸 : L + δp a) ∇_r N_I with δp = k Σ_{q∈c} b_q : L_q |
 //! | [`PressureRows`] | points of loaded surfaces | Σ δ(p A cof(F) N) N_I |
 //! | [`ContactRows`] | points in contact | −Σ (∂f/∂x δx + ∂f/∂q δq) N_I |
@@ -11,12 +11,12 @@
 mod cells;
 mod contact;
 mod pressure;
-mod stress;
+mod rows;
 
 pub(crate) use cells::{CellLayout, CellRows, MixedCell};
 pub(crate) use contact::{ContactRow, ContactRows};
 pub(crate) use pressure::{PressureRow, PressureRows};
-pub(crate) use stress::StressRows;
+pub(crate) use rows::Rows;
 
 use crate::gpu::{self, Gpu};
 use crate::mechanics::effective::Function;
@@ -24,13 +24,13 @@ use crate::mechanics::mass::Mass;
 use crate::mechanics::sweep::{At, Group, Mode, Quadratic, Supports};
 use crate::tensor::{Tensor, Vector, identity, scaled};
 
-/// A linearised step.
-#[derive(Debug)]
+/// A linearised step. By default it is that of no term.
+#[derive(Debug, Default)]
 pub(crate) struct Linearized<const D: usize> {
     /// α, the factor of M̃.
     pub mass: f64,
     /// The tangents of the laws.
-    pub stresses: Vec<StressRows>,
+    pub stresses: Vec<Rows>,
     /// The tangents of averaged cells.
     pub cells: Vec<CellRows<D>>,
     /// Follower pressures.
@@ -55,17 +55,6 @@ pub(crate) type PressureChanges = Vec<Vec<f64>>;
 pub(crate) type FunctionsAt<'a, const D: usize> = dyn Fn(usize) -> Vec<(usize, Function<D>)> + 'a;
 
 impl<const D: usize> Linearized<D> {
-    /// The linearisation of no term.
-    pub(crate) fn zero() -> Self {
-        Self {
-            mass: 0.0,
-            stresses: Vec::new(),
-            cells: Vec::new(),
-            pressures: PressureRows::default(),
-            contacts: ContactRows::default(),
-        }
-    }
-
     /// `out += K u`
     pub(crate) fn add_product(
         &self,
@@ -77,7 +66,7 @@ impl<const D: usize> Linearized<D> {
         self.add_product_at_nodes(mass, u, out);
         let Some(mode) = self.mode(mass) else { return };
         let changes = self.pressure_changes(mass.supports, Along::Field(u, pressures));
-        mass.supports.accumulate(Some(u), mode, out, |group, at, sums| {
+        mass.supports.sweep(Some(u), mode, out, |group, at, sums| {
             self.add_product_of_group(mass, &changes, group, at, sums);
         });
     }
@@ -126,7 +115,7 @@ impl<const D: usize> Linearized<D> {
 
     /// The rows of laws and averaged cells on a device.
     pub(crate) fn rows_on_device(&self, gpu: &Gpu, supports: &Supports<D>) -> Vec<gpu::Rows> {
-        let stresses = self.stresses.iter().map(|rows| rows.on_device(gpu, D));
+        let stresses = self.stresses.iter().map(|rows| rows.on_device(gpu));
         stresses.chain(self.cells.iter().map(|cells| cells.on_device(gpu, supports))).collect()
     }
 
@@ -158,8 +147,8 @@ impl<const D: usize> Linearized<D> {
                 form.mass[lane] += self.mass * mass.consistent(p as usize);
             }
         }
-        self.stresses.iter().for_each(|rows| rows.add_quadratic(D, group, form));
-        self.cells.iter().for_each(|rows| rows.add_quadratic(group, form));
+        let rows = self.stresses.iter().chain(self.cells.iter().map(|cells| &cells.rows));
+        rows.for_each(|rows| rows.add_quadratic(D, group, form));
     }
 
     /// The averaged cells whose dilatation is an unknown of its own.

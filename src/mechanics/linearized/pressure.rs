@@ -6,7 +6,7 @@ use crate::mechanics::sweep::Supports;
 use crate::tensor::{Tensor, Vector, cofactor_derivative};
 
 /// The points of loaded surfaces.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct PressureRows<const D: usize>(pub Vec<PressureRow<D>>);
 
 /// cof F = cof ΔF cof F_r, so δ(p A cof(F) N) is the derivative of cof ΔF along L = ∇_r u, applied to p A cof(F_r) N.
@@ -17,12 +17,6 @@ pub(crate) struct PressureRow<const D: usize> {
     pub delta_f: Tensor<f64, D>,
     /// p A cof(F_r) N
     pub force: Vector<f64, D>,
-}
-
-impl<const D: usize> Default for PressureRows<D> {
-    fn default() -> Self {
-        Self(Vec::new())
-    }
 }
 
 impl<const D: usize> PressureRows<D> {

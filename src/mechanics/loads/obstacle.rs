@@ -64,7 +64,8 @@ impl<const D: usize> Obstacle<D> {
     /// let turn = Motion::Rotation(Rotation::new(Vector::from([1.0, 0.0]), [0.0, 0.0, 1.0], quarter));
     /// let disc = Ball { center: Vector::from([3.0, 0.0]), radius: 1.0 }.into();
     /// let obstacle = Obstacle::new("disc", disc, [Some(turn.clone()), Some(turn)], ContactConstants::default());
-    /// let center = obstacle.pose(1.0).to_space(&Vector::from([3.0, 0.0]));
+    /// let pose = obstacle.pose(1.0);
+    /// let center = pose.rotation * Vector::from([3.0, 0.0]) + pose.shift;
     /// assert!((center - Vector::from([1.0, 2.0])).norm() < 1e-15);
     /// # Ok::<(), bfree::mechanics::loads::CurveError>(())
     /// ```

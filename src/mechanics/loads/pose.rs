@@ -26,7 +26,7 @@ impl<T: Real, const D: usize> Pose<D, T> {
     }
 
     /// x = b + R X
-    pub fn to_space(&self, x: &Vector<T, D>) -> Vector<T, D> {
+    pub(crate) fn to_space(self, x: &Vector<T, D>) -> Vector<T, D> {
         self.shift + self.rotation * x
     }
 }

@@ -130,26 +130,7 @@ impl PrescribedDof {
 
 /// The degrees of freedom prescribed in the step from `t` to `t + dt`, by node and component. `moved` is the nodal motion since the last
 /// grid reset. Right after a reset there is no such motion, and `moved` is empty.
-///
-/// ```
-/// use bfree::grid::Grid;
-/// use bfree::mechanics::loads::{Curve, Motion, Prescribed, Selection, prescribed_dofs};
-/// use bfree::space::Nodes;
-/// use bfree::tensor::Vector;
-///
-/// // A floor on which bodies slide, and a wall at the left that pushes with velocity 2.
-/// let grid = Grid { origin: Vector::from([0.0, 0.0]), spacing: 1.0, cells: [4, 4] };
-/// let face = |axis| Selection::Face { axis, upper: false };
-/// let pushing = Some(Motion::Velocity(Curve::constant(2.0)));
-/// let floor = Prescribed { name: "floor".into(), on: face(1), motion: [None, Some(Motion::Rest)] };
-/// let wall = Prescribed { name: "wall".into(), on: face(0), motion: [pushing, None] };
-/// // The nodes of the cell in the corner: two on the floor, two at the wall, one of them in both pairs.
-/// let nodes = Nodes::new([[0, 0], [1, 0], [0, 1], [1, 1]].map(|index| grid.id(index)).into());
-/// let dofs = prescribed_dofs(&[floor, wall], &grid, &nodes, &[], 0.0, 0.5);
-/// let held: Vec<_> = dofs.iter().map(|dof| (dof.node, dof.component, dof.step.increment)).collect();
-/// assert_eq!(held, [(0, 0, 1.0), (0, 1, 0.0), (1, 1, 0.0), (2, 0, 1.0)]);
-/// ```
-pub fn prescribed_dofs<const D: usize>(
+pub(crate) fn prescribed_dofs<const D: usize>(
     prescribed: &[Prescribed<D>],
     grid: &Grid<D>,
     nodes: &Nodes,
@@ -224,5 +205,20 @@ mod tests {
         assert_eq!((before.acceleration_end, behind.acceleration_start), (4.0, 0.0));
         assert_eq!(before.velocity_end, behind.velocity_start);
         Ok(())
+    }
+
+    #[test]
+    fn a_node_in_a_corner_is_held_by_floor_and_wall() {
+        // A floor on which bodies slide, and a wall at the left that pushes with velocity 2.
+        let grid = Grid { origin: Vector::from([0.0, 0.0]), spacing: 1.0, cells: [4, 4] };
+        let face = |axis| Selection::Face { axis, upper: false };
+        let pushing = Some(Motion::Velocity(Curve::constant(2.0)));
+        let floor = Prescribed { name: "floor".into(), on: face(1), motion: [None, Some(Motion::Rest)] };
+        let wall = Prescribed { name: "wall".into(), on: face(0), motion: [pushing, None] };
+        // The nodes of the cell in the corner: two on the floor, two at the wall, one of them in both pairs.
+        let nodes = Nodes::new([[0, 0], [1, 0], [0, 1], [1, 1]].map(|index| grid.id(index)).into());
+        let dofs = prescribed_dofs(&[floor, wall], &grid, &nodes, &[], 0.0, 0.5);
+        let held: Vec<_> = dofs.iter().map(|dof| (dof.node, dof.component, dof.step.increment)).collect();
+        assert_eq!(held, [(0, 0, 1.0), (0, 1, 0.0), (1, 1, 0.0), (2, 0, 1.0)]);
     }
 }

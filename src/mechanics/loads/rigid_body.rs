@@ -100,7 +100,8 @@ impl<const D: usize> RigidBody<D> {
     /// let disc = RigidBody::new(5.0, identity::<f64, 3>() * 0.5, center, Vector::zeros(), spin);
     /// let mut q = Vector::zeros();
     /// q[5] = std::f64::consts::FRAC_PI_2;
-    /// let right = disc.pose(&q).to_space(&Vector::from([3.0, 1.0]));
+    /// let pose = disc.pose(&q);
+    /// let right = pose.rotation * Vector::from([3.0, 1.0]) + pose.shift;
     /// assert!((right - Vector::from([2.0, 2.0])).norm() < 1e-14);
     /// assert_eq!(disc.kinetic_energy(), 2.25);
     /// ```
@@ -276,8 +277,8 @@ mod tests {
     fn a_symmetric_top_precesses_with_second_order() {
         for scheme in [&Newmark::default() as &dyn Scheme, &GeneralizedAlpha { spectral_radius: 0.5 }] {
             let order = (error_of_top(scheme, 50) / error_of_top(scheme, 100)).log2();
-            assert!((order - 2.0).abs() < 0.1, "{scheme}: {order}");
-            assert!(error_of_top(scheme, 100) < 1e-3, "{scheme}: {}", error_of_top(scheme, 100));
+            assert!((order - 2.0).abs() < 0.1, "{scheme:?}: {order}");
+            assert!(error_of_top(scheme, 100) < 1e-3, "{scheme:?}: {}", error_of_top(scheme, 100));
         }
     }
 }

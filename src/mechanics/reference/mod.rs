@@ -15,13 +15,13 @@
 //! stay together, and do not cause resets.
 //!
 //! **Out-of-balance force.** In load steps, a state in balance on the old grid is not in balance on the new one. Its residual R₀ on the new
-//! grid is carried over as a force on the nodes ([`LastEquilibrium`]), or each reset would add an error of its own to the stresses.
+//! grid is carried over as a force on the nodes (`equilibrium.rs`), or each reset would add an error of its own to the stresses.
 
 mod contact;
 mod equilibrium;
 
 pub(crate) use contact::{pairs, reached_body, reached_conditions, touch};
-pub use equilibrium::LastEquilibrium;
+pub(crate) use equilibrium::LastEquilibrium;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

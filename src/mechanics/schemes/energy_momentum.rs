@@ -1,7 +1,6 @@
 //! The energy–momentum scheme, which the paper names as future work.
 
 use super::{Alphas, GeneralizedAlpha, Scheme};
-use std::fmt::{Display, Formatter};
 
 /// The midpoint rule, M (v_{n+1} − v_n)/Δt + Σ V₀ P̄ ∇N = f(t_{n+½}) and Δφ = ½ Δt (v_n + v_{n+1}), with the mean stress P̄ of the step
 /// (`constitutive/discrete_gradient.rs`) in place of the stress at the middle.
@@ -24,13 +23,11 @@ pub struct EnergyMomentum;
 /// The midpoint rule.
 const MIDPOINT: GeneralizedAlpha = GeneralizedAlpha { spectral_radius: 1.0 };
 
-impl Display for EnergyMomentum {
-    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
-        f.write_str("energy–momentum")
-    }
-}
-
 impl Scheme for EnergyMomentum {
+    fn name(&self) -> String {
+        "energy–momentum".into()
+    }
+
     fn instant(&self) -> f64 {
         MIDPOINT.instant()
     }

@@ -4,7 +4,6 @@ use super::{Alphas, Newmark, Scheme};
 use crate::problems::Problems;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::fmt::{Display, Formatter};
 
 /// M a(t_{n+1−α_m}) + R(φ_{n+1−α_f}, t_{n+1−α_f}) = 0 with Newmark's relations between Δφ, v and a. The motion is interpolated, not the
 /// force. α_m = α_f = ½ is the midpoint rule.
@@ -47,13 +46,11 @@ impl GeneralizedAlpha {
     }
 }
 
-impl Display for GeneralizedAlpha {
-    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
-        write!(f, "generalised-α ρ∞ = {}", self.spectral_radius)
-    }
-}
-
 impl Scheme for GeneralizedAlpha {
+    fn name(&self) -> String {
+        format!("generalised-α ρ∞ = {}", self.spectral_radius)
+    }
+
     fn instant(&self) -> f64 {
         self.weights().1
     }

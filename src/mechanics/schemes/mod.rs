@@ -4,13 +4,11 @@
 //! In every scheme, a and v are affine functions of the motion increment, of one form ([`Alphas`]). The terms of the residual therefore do
 //! not depend on the scheme.
 
-mod arc_length;
 mod energy_momentum;
 mod generalized_alpha;
 mod newmark;
 mod statics;
 
-pub use arc_length::ArcLength;
 pub use energy_momentum::EnergyMomentum;
 pub use generalized_alpha::GeneralizedAlpha;
 pub use newmark::Newmark;
@@ -20,16 +18,19 @@ use crate::problems::Problems;
 use crate::tensor::Vector;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::fmt::{Debug, Display};
+use std::fmt::Debug;
 use std::sync::Arc;
 
 /// Courant number of pressure waves. Above it, inertia hardly restrains a node at the boundary of a body.
 pub(crate) const LONG_STEPS: f64 = 10.0;
 
-/// A time integration scheme, from t_n to t_{n+1}. Its [`Display`] is its name in reports.
+/// A time integration scheme, from t_n to t_{n+1}.
 ///
 /// Newton's unknown is the motion up to t_n + θ Δt, where forces are in balance. Δφ of the whole step is 1/θ of this motion.
-pub trait Scheme: Debug + Display + Send + Sync {
+pub trait Scheme: Debug + Send + Sync {
+    /// The name in reports.
+    fn name(&self) -> String;
+
     /// θ in (0, 1].
     fn instant(&self) -> f64 {
         1.0
@@ -87,8 +88,8 @@ impl Parameters {
             Self::Newmark => Arc::new(newmark),
             Self::GeneralizedAlpha(scheme) => Arc::new(scheme),
             Self::EnergyMomentum => Arc::new(EnergyMomentum),
-            Self::None => Arc::new(Statics),
-            Self::ArcLength => Arc::new(ArcLength),
+            Self::None => Arc::new(Statics { by_arc_length: false }),
+            Self::ArcLength => Arc::new(Statics { by_arc_length: true }),
         }
     }
 

@@ -1,7 +1,6 @@
 //! Incremental Newmark-β (the paper's Table 1).
 
 use super::{Alphas, Scheme};
-use std::fmt::{Display, Formatter};
 
 /// Newmark's parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,13 +35,11 @@ impl Newmark {
     }
 }
 
-impl Display for Newmark {
-    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
-        write!(f, "Newmark β = {}, γ = {}", self.beta, self.gamma)
-    }
-}
-
 impl Scheme for Newmark {
+    fn name(&self) -> String {
+        format!("Newmark β = {}, γ = {}", self.beta, self.gamma)
+    }
+
     fn end(&self, dt: f64) -> Alphas {
         self.alphas(dt)
     }

@@ -4,12 +4,10 @@
 use super::block::Block;
 use super::builder::{Builder, Scratch};
 use super::columns::Family;
-use super::fields::Fields;
 use super::order::Key;
 use super::points::Points;
 use crate::approximation::ShapeFunction;
 use crate::grid::Grid;
-use crate::parallel::Processes;
 use std::fmt::{self, Debug};
 use std::sync::OnceLock;
 
@@ -45,9 +43,7 @@ impl Foreign {
         let points = Points::<'static, D> {
             positions: positions.into(),
             extrapolation: surface.filter_map(of).collect(),
-            ids: None,
-            fields: Fields::default(),
-            processes: Processes::default(),
+            ..Points::default()
         };
         let build = move |keys: &[Key], block: &mut Block| {
             let Some(product) = approximation.separable() else { return };

@@ -1,6 +1,5 @@
 //! The nodal fields of the active nodes, and the lattice in which these fields lie side by side.
 
-use super::points::Points;
 use super::supports::Supports;
 
 /// The distance between neighbouring fields in a [lattice](Supports::in_lattice), in cells. It is even on coarser grids of multigrid, down to
@@ -10,11 +9,6 @@ pub(crate) fn stride(cells: u32) -> u64 {
 }
 
 impl<const D: usize> Supports<D> {
-    pub(super) fn with_fields(mut self, points: &Points<'_, D>) -> Self {
-        self.fields.clone_from(&points.fields.of_body);
-        self
-    }
-
     /// The number of nodal fields.
     pub(crate) fn field_count(&self) -> u32 {
         self.fields.iter().max().map_or(1, |last| last + 1)

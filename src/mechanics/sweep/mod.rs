@@ -26,7 +26,6 @@
 //!
 //! Threads are used here and in the vectors of the space.
 
-mod at_particle;
 mod block;
 mod blocks;
 mod builder;
@@ -49,9 +48,7 @@ mod shares;
 mod supports;
 mod tiled;
 
-pub use at_particle::AtParticle;
-pub use blocks::Quadratic;
-pub(crate) use blocks::pair;
+pub(crate) use blocks::{Quadratic, pair};
 pub(crate) use columns::WIDEST;
 pub use fields::Fields;
 pub use group::{At, Group};
@@ -61,13 +58,36 @@ pub use number::Number;
 pub use points::{Points, SupportError};
 pub use supports::Supports;
 
-use crate::lanes::LANES;
+use block::Block;
 
 /// `(group, u and L, q and σ)` of every field: adds to q and σ, which begin with zero. A pass makes this function once.
 type Point<'a, const C: usize, const D: usize> = dyn Fn(Group<'_>, &[At<f64, C, D>], &mut [At<f64, C, D>]) + Sync + 'a;
 
-/// `(group, u and L of every field, results)`: writes the results of the group's particles.
+/// `(group, u and L of every field, results)`: writes the results of the group.
 type Evaluate<'a, R, const C: usize, const D: usize> = dyn Fn(Group<'_>, &[At<f64, C, D>], &mut [R]) + Sync + 'a;
 
-/// `(group, u and L, rows)`: fills the rows of a group.
-type Fill<'a, const D: usize> = dyn Fn(Group<'_>, &At<f64, D, D>, &mut [[f64; LANES]]) + Sync + 'a;
+/// The owners of the results of a pass.
+#[derive(Clone, Copy)]
+enum Each {
+    Particle,
+    /// So many results for each group.
+    Group(usize),
+}
+
+impl Each {
+    /// The number of results of a group with so many particles.
+    fn of_group(self, particles: usize) -> usize {
+        match self {
+            Self::Particle => particles,
+            Self::Group(count) => count,
+        }
+    }
+
+    /// The number of results of a block.
+    fn of_block(self, block: &Block) -> usize {
+        match self {
+            Self::Particle => block.count(),
+            Self::Group(count) => block.len() * count,
+        }
+    }
+}

@@ -1,7 +1,7 @@
 //! The number types of nodal fields. Gather and scatter are linear, so a dual number is two fields of plain numbers.
 
-use super::at_particle::AtParticle;
 use super::group::At;
+use crate::parallel::Message;
 use crate::scalar::Real;
 use crate::tensor::Vector;
 use num_dual::Dual64;
@@ -9,7 +9,7 @@ use std::array::from_fn;
 use std::borrow::Cow;
 
 /// A number made of one or more plain numbers. Each of them is a field of its own in the kernels.
-pub trait Number: Real + AtParticle + Send + Sync + 'static {
+pub trait Number: Real + Message + Send + Sync + 'static {
     /// Number of plain numbers in it.
     const FIELDS: usize;
 
@@ -28,26 +28,25 @@ pub trait Number: Real + AtParticle + Send + Sync + 'static {
         Cow::Owned(nodal.iter().flat_map(numbers).collect())
     }
 
-    /// Calls `point` with the numbers made of the gathered `fields`. Its result goes into the fields of `sums`, which are zero before.
+    /// Calls `point` with the numbers made of the gathered `fields`. Its sums go into the fields of `sums`, which are zero before.
     #[doc(hidden)]
-    fn at<R, const C: usize, const D: usize>(
+    fn at<const C: usize, const D: usize>(
         fields: &[At<f64, C, D>],
         sums: &mut [At<f64, C, D>],
-        point: impl FnOnce(&At<Self, C, D>, &mut At<Self, C, D>) -> R,
-    ) -> R {
+        point: impl FnOnce(&At<Self, C, D>, &mut At<Self, C, D>),
+    ) {
         let number = |x: &dyn Fn(&At<f64, C, D>) -> f64| Self::from_fields(|i| x(&fields[i]));
         let at = At {
             value: from_fn(|c| from_fn(|lane| number(&|at| at.value[c][lane]))),
             gradient: from_fn(|c| from_fn(|k| from_fn(|lane| number(&|at| at.gradient[c][k][lane])))),
         };
         let mut sum = At::<Self, C, D>::zero();
-        let result = point(&at, &mut sum);
+        point(&at, &mut sum);
         for (i, sums) in sums.iter_mut().enumerate() {
             let field = |x: Self| x.field(i);
             sums.value = sum.value.map(|row| row.map(field));
             sums.gradient = sum.gradient.map(|rows| rows.map(|row| row.map(field)));
         }
-        result
     }
 
     /// Calls `add` with a nodal field as plain numbers, and writes them back.
@@ -77,12 +76,12 @@ impl Number for f64 {
         Cow::Borrowed(bytemuck::cast_slice(nodal))
     }
 
-    fn at<R, const C: usize, const D: usize>(
+    fn at<const C: usize, const D: usize>(
         fields: &[At<f64, C, D>],
         sums: &mut [At<f64, C, D>],
-        point: impl FnOnce(&At<Self, C, D>, &mut At<Self, C, D>) -> R,
-    ) -> R {
-        point(&fields[0], &mut sums[0])
+        point: impl FnOnce(&At<Self, C, D>, &mut At<Self, C, D>),
+    ) {
+        point(&fields[0], &mut sums[0]);
     }
 
     fn add_flat<const C: usize>(nodal: &mut [Vector<Self, C>], add: impl FnOnce(&mut [f64])) {

@@ -1,7 +1,6 @@
 //! The shape functions of all particles as plain arrays, for a device.
 
 use super::Supports;
-use super::supports::Implementation;
 use super::tiled::Tiled;
 use crate::gpu::{Gpu, Masses, Transfer, TransferArrays};
 use crate::lanes::LANES;
@@ -16,7 +15,7 @@ impl<const D: usize> Supports<D> {
 
     /// The shape functions on the device, copied there at the first call; `None` without a device, or for the plain loop.
     pub(crate) fn on_device(&self) -> Option<&Arc<Transfer>> {
-        let (gpu, Implementation::Tiled(tiled)) = (self.gpu.as_ref()?, &self.implementation) else { return None };
+        let (gpu, tiled) = (self.gpu.as_ref()?, self.tiled()?);
         let copied = || {
             let weights = tiled.blocks.iter().map(|block| block.weights.as_slice());
             Arc::new(Transfer::new(gpu.clone(), &tiled.arrays(self.nodes.len()), weights))
@@ -26,10 +25,7 @@ impl<const D: usize> Supports<D> {
 
     /// The masses of particles and nodes on the device, copied there at the first call.
     pub(crate) fn masses_on_device(&self, gpu: &Gpu, mass: impl Fn(usize) -> f64, lumped: &[f64]) -> Arc<Masses> {
-        let by_lane = || match &self.implementation {
-            Implementation::Plain(_) => Vec::new(),
-            Implementation::Tiled(tiled) => tiled.by_lane(mass),
-        };
+        let by_lane = || self.tiled().map_or_else(Vec::new, |tiled| tiled.by_lane(mass));
         let copied = || Masses { consistent: gpu.copy_of(&by_lane()), lumped: gpu.copy_of(lumped) };
         self.masses_on_device.get_or_init(|| Arc::new(copied())).clone()
     }
@@ -39,7 +35,7 @@ impl<const D: usize> Supports<D> {
     /// Bytes of the shape functions on a device, with the boxes of all blocks, and bytes of the memory that the threads of a block share; 0 for
     /// the plain loop.
     pub(crate) fn device_bytes(&self) -> [usize; 2] {
-        let Implementation::Tiled(tiled) = &self.implementation else { return [0; 2] };
+        let Some(tiled) = self.tiled() else { return [0; 2] };
         let weights: usize = tiled.blocks.iter().map(|block| size_of_val(block.weights.as_slice())).sum();
         let arrays = tiled.arrays(self.nodes.len());
         [arrays.bytes() + weights, arrays.shared()]

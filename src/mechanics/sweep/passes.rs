@@ -3,54 +3,33 @@
 use super::group::At;
 use super::supports::{Implementation, dispatch};
 use super::tiled::Tiled;
-use super::{AtParticle, Group, Mode, Number, Quadratic, Supports, Weights};
+use super::{Each, Group, Mode, Number, Quadratic, Supports, Weights};
 use crate::lanes::LANES;
 use crate::parallel::{First, Message};
 use crate::pooled::{Element, Pooled};
 use crate::tensor::{Tensor, Vector};
-use std::convert::Infallible;
+use bytemuck::Pod;
+use num_traits::Zero;
 
 impl<const D: usize> Supports<D> {
     /// `f_I += Σ_p q N_I + σ ∇_r N_I` for C components: 1 or D. `point(group, u and L, q and σ)` adds to q and σ, which begin with
     /// zero. Without a field u and L are unspecified.
-    ///
-    /// # Errors
-    /// An error of `point` carries a number. The error with the smallest number is returned, and `out` is then unspecified.
-    pub fn sweep<T: Number, const C: usize, E: Send + Message>(
-        &self,
-        field: Option<&[Vector<T, C>]>,
-        mode: Mode,
-        out: &mut [Vector<T, C>],
-        point: impl Fn(Group<'_>, &At<T, C, D>, &mut At<T, C, D>) -> Result<(), (usize, E)> + Sync,
-    ) -> Result<(), E> {
-        const { assert!(C == 1 || C == D) };
-        self.pass();
-        let failure = First::none();
-        let point = |group: Group<'_>, fields: &[At<f64, C, D>], sums: &mut [At<f64, C, D>]| {
-            if let Err((number, error)) = T::at(fields, sums, |at, sums| point(group, at, sums)) {
-                failure.keep(number, error);
-            }
-        };
-        let field = field.map(T::flat);
-        T::add_flat(out, |out| {
-            dispatch!(self, one => one.sweep::<C>(T::FIELDS, field.as_deref(), mode, out, &point));
-        });
-        failure.check(self.processes())
-    }
-
-    /// [`Self::sweep`] of a function that always has a value, such as a product with a tangent.
-    pub(crate) fn accumulate<T: Number, const C: usize>(
+    pub fn sweep<T: Number, const C: usize>(
         &self,
         field: Option<&[Vector<T, C>]>,
         mode: Mode,
         out: &mut [Vector<T, C>],
         point: impl Fn(Group<'_>, &At<T, C, D>, &mut At<T, C, D>) + Sync,
     ) {
-        let point = |group: Group<'_>, at: &_, sums: &mut _| -> Result<(), (usize, Infallible)> {
-            point(group, at, sums);
-            Ok(())
+        const { assert!(C == 1 || C == D) };
+        self.pass();
+        let point = |group: Group<'_>, fields: &[At<f64, C, D>], sums: &mut [At<f64, C, D>]| {
+            T::at(fields, sums, |at, sums| point(group, at, sums));
         };
-        let Ok(()) = self.sweep(field, mode, out, point);
+        let field = field.map(T::flat);
+        T::add_flat(out, |out| {
+            dispatch!(self, one => one.sweep::<C>(T::FIELDS, field.as_deref(), mode, out, &point));
+        });
     }
 
     /// Calls `fill(group, L, rows)` for every group of this process. Each of them has `count` rows.
@@ -61,8 +40,8 @@ impl<const D: usize> Supports<D> {
         rows: &mut [[f64; LANES]],
         fill: impl Fn(Group<'_>, &At<f64, D, D>, &mut [[f64; LANES]]) + Sync,
     ) {
-        self.pass();
-        dispatch!(self, one => one.fill_rows(bytemuck::cast_slice(field), count, rows, &fill));
+        let fill = |group: Group<'_>, at: &[At<f64, D, D>], rows: &mut [[f64; LANES]]| fill(group, &at[0], rows);
+        self.results(Each::Group(count), 1, Some(bytemuck::cast_slice(field)), Mode::GRADIENT, rows, fill);
     }
 
     /// [`Self::fill_rows`] for the groups of all processes.
@@ -75,9 +54,21 @@ impl<const D: usize> Supports<D> {
     ) {
         let own = self.own_groups();
         self.fill_rows(field, count, &mut rows[own.start * count..own.end * count], fill);
-        if let Implementation::Tiled(tiled) = &self.implementation {
-            tiled.share_rows(count, rows);
+        if let Some(tiled) = self.tiled() {
+            tiled.share_numbers(Each::Group(count), LANES, rows.as_flattened_mut());
         }
+    }
+
+    /// `evaluate(group)` of all groups, in the order of their numbers.
+    pub(crate) fn map_groups<R: Clone + Send + Message>(&self, evaluate: impl Fn(Group<'_>) -> R + Sync) -> Vec<R> {
+        let mut results = vec![R::unknown(); self.groups()];
+        let evaluate = |group: Group<'_>, _: &[At<f64, D, D>], results: &mut [R]| results[0] = evaluate(group);
+        let own = &mut results[self.own_groups()];
+        dispatch!(self, one => one.results(Each::Group(1), 0, None, Mode::BOTH, &evaluate, own));
+        if let Some(tiled) = self.tiled() {
+            tiled.share_results(Each::Group(1), &mut results);
+        }
+        results
     }
 
     /// `out_I +=` Σ_p B_p(∇_r N_I, ∇_r N_I) + m_p N_I² I, the nodal diagonal blocks of quadratic forms. `quadratic` fills in the form of
@@ -91,9 +82,8 @@ impl<const D: usize> Supports<D> {
     /// ∇u_p = Σ u_I ⊗ ∇_r N_I. The scatter has the given weights in place of N and ∇_r N.
     ///
     /// ```
-    /// use bfree::mechanics::{check::direction, sweep::{Supports, Weights}};
+    /// use bfree::mechanics::{check::direction, residual::Inadmissible, sweep::{Supports, Weights}};
     /// use bfree::tensor::{Tensor, Vector, contract};
-    /// use std::convert::Infallible;
     ///
     /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
     /// let simulation = scene.build::<2>("scenes".as_ref())?;
@@ -103,17 +93,17 @@ impl<const D: usize> Supports<D> {
     /// let (u, w) = (direction::<2>(nodes.len(), 1), direction::<2>(nodes.len(), 2));
     /// let state = |u: Vector<f64, 2>, gradient: Tensor<f64, 2>| (u * 3.0, gradient * 2.0);
     /// let mut force = vec![Vector::zeros(); nodes.len()];
-    /// supports.assemble(&u, Weights::Signed, &mut force, |_, u, gradient| Ok::<_, Infallible>(state(u, gradient)))?;
+    /// supports.assemble(&u, Weights::Signed, &mut force, |_, u, gradient| Ok::<_, Inadmissible>(state(u, gradient)))?;
     /// let at_nodes: f64 = force.iter().zip(&w).map(|(f, w)| f.dot(w)).sum();
-    /// let states = supports.interpolate(&u, |_, u, gradient| Ok::<_, Infallible>(state(u, gradient)))?;
+    /// let states = supports.interpolate(&u, |_, u, gradient| Ok::<_, Inadmissible>(state(u, gradient)))?;
     /// let work = supports.interpolate(&w, |p, w, gradient| {
     ///     let (q, sigma) = states[p];
-    ///     Ok::<_, Infallible>(contract(&sigma, &gradient) + q.dot(&w))
+    ///     Ok::<_, Inadmissible>(contract(&sigma, &gradient) + q.dot(&w))
     /// })?;
     /// assert!((at_nodes - work.iter().sum::<f64>()).abs() < 1e-10);
     ///
     /// // A uniform pressure acts on the rim of a body. Inside, the forces of the particles around a node cancel, but their sizes do not.
-    /// let pressure = |_: usize, _: Vector<f64, 2>, _: Tensor<f64, 2>| Ok::<_, Infallible>((Vector::zeros(), Tensor::identity()));
+    /// let pressure = |_: usize, _: Vector<f64, 2>, _: Tensor<f64, 2>| Ok::<_, Inadmissible>((Vector::zeros(), Tensor::identity()));
     /// let (mut force, mut size) = (vec![Vector::zeros(); nodes.len()], vec![Vector::zeros(); nodes.len()]);
     /// supports.assemble(&u, Weights::Signed, &mut force, pressure)?;
     /// supports.assemble(&u, Weights::Magnitude, &mut size, pressure)?;
@@ -133,7 +123,7 @@ impl<const D: usize> Supports<D> {
         point: impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> Result<(Vector<T, D>, Tensor<T, D>), E> + Sync,
     ) -> Result<(), E> {
         let failure = First::none();
-        self.accumulate(Some(field), Mode { weights, ..Mode::BOTH }, out, |group, at, sums| {
+        self.sweep(Some(field), Mode { weights, ..Mode::BOTH }, out, |group, at, sums| {
             for (lane, &p) in group.particles.iter().enumerate() {
                 let (value, gradient) = at.lane(lane);
                 match point(p as usize, value, gradient) {
@@ -166,7 +156,7 @@ impl<const D: usize> Supports<D> {
         out: &mut [Vector<f64, C>],
         value: impl Fn(usize) -> Vector<f64, C> + Sync,
     ) {
-        self.accumulate(None, Mode { weights, ..Mode::VALUE }, out, |group, _, sums| {
+        self.sweep(None, Mode { weights, ..Mode::VALUE }, out, |group, _, sums| {
             for (lane, &p) in group.particles.iter().enumerate() {
                 let value = value(p as usize);
                 (0..C).for_each(|c| sums.value[c][lane] = value[c]);
@@ -182,36 +172,42 @@ impl<const D: usize> Supports<D> {
         Vector<f64, C>: Element,
     {
         const { assert!(C == 1 || C == D) };
-        let point = |_: usize, at: &[At<f64, C, D>], lane: usize| Vector::from_fn(|c, _| at[0].value[c][lane]);
-        let mut values = self.pool().unspecified(self.particles(), Vector::zeros());
-        let own = &mut values[self.own_places()];
-        self.at_own_particles(1, bytemuck::cast_slice(field), Mode::VALUE, own, point);
-        self.in_memory_order(&mut values, |tiled, values| tiled.share_numbers(C, bytemuck::cast_slice_mut(values)));
-        values
+        self.gathered(false, field, Mode::VALUE, |at, lane| Vector::from_fn(|c, _| at.value[c][lane]))
     }
 
     /// [`Self::values`] at the [own particles](Self::own_particles) of this process.
     pub(crate) fn own_values(&self, field: &[Vector<f64, D>]) -> Pooled<Vector<f64, D>> {
-        if !self.is_memory_order() {
-            return self.values(field);
-        }
-        let point = |_: usize, at: &[At<f64, D, D>], lane: usize| Vector::from_fn(|c, _| at[0].value[c][lane]);
-        let mut values = self.pool().unspecified(self.own_places().len(), Vector::zeros());
-        self.at_own_particles(1, bytemuck::cast_slice(field), Mode::VALUE, &mut values, point);
-        values
+        self.gathered(true, field, Mode::VALUE, |at, lane| Vector::from_fn(|c, _| at.value[c][lane]))
     }
 
     /// Σ u_I ⊗ ∇_r N_I at the [own particles](Self::own_particles) of this process.
     pub(crate) fn own_gradients(&self, field: &[Vector<f64, D>]) -> Pooled<Tensor<f64, D>> {
-        let point = |_: usize, at: &[At<f64, D, D>], lane: usize| Tensor::from_fn(|c, k| at[0].gradient[c][k][lane]);
-        let mut gradients = self.pool().unspecified(self.own_particles().len(), Tensor::zeros());
-        if self.is_memory_order() {
-            self.at_own_particles(1, bytemuck::cast_slice(field), Mode::GRADIENT, &mut gradients, point);
-            return gradients;
+        self.gathered(true, field, Mode::GRADIENT, |at, lane| Tensor::from_fn(|c, k| at.gradient[c][k][lane]))
+    }
+
+    /// `point(u and L, lane)` of all particles, or of the [own particles](Self::own_particles) of this process.
+    fn gathered<X: Element + Zero + Pod, const C: usize>(
+        &self,
+        own_alone: bool,
+        field: &[Vector<f64, C>],
+        mode: Mode,
+        point: impl Fn(&At<f64, C, D>, usize) -> X + Sync,
+    ) -> Pooled<X> {
+        let (field, own) = (bytemuck::cast_slice(field), self.own_places());
+        let point = |_: usize, at: &[At<f64, C, D>], lane: usize| point(&at[0], lane);
+        // Without the order of the passes in memory, the own particles are all particles.
+        if own_alone && self.is_memory_order() {
+            let mut results = self.pool().unspecified(own.len(), X::zero());
+            self.at_own_particles(1, field, mode, &mut results, point);
+            return results;
         }
-        self.at_own_particles(1, bytemuck::cast_slice(field), Mode::GRADIENT, &mut gradients[self.own_places()], point);
-        self.in_memory_order(&mut gradients, |tiled, all| tiled.share_numbers(D * D, bytemuck::cast_slice_mut(all)));
-        gradients
+        let mut results = self.pool().unspecified(self.particles(), X::zero());
+        self.at_own_particles(1, field, mode, &mut results[own], point);
+        let count = size_of::<X>() / size_of::<f64>();
+        self.in_memory_order(&mut results, |tiled, results| {
+            tiled.share_numbers(Each::Particle, count, bytemuck::cast_slice_mut(results));
+        });
+        results
     }
 
     /// `point(p, u_p, ∇u_p)` of every particle.
@@ -228,7 +224,7 @@ impl<const D: usize> Supports<D> {
     /// assert!(divergence.iter().all(|one| one.abs() < 1e-12));
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn evaluate<T: Number, R: AtParticle>(
+    pub fn evaluate<T: Number, R: Copy + Send + Message>(
         &self,
         field: &[Vector<T, D>],
         point: impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> R + Sync,
@@ -238,9 +234,9 @@ impl<const D: usize> Supports<D> {
             let gradient = Tensor::from_fn(|c, k| T::from_fields(|i| fields[i].gradient[c][k][lane]));
             point(p, value, gradient)
         };
-        let mut results = vec![R::blank(); self.particles()];
+        let mut results = vec![R::unknown(); self.particles()];
         self.at_own_particles(T::FIELDS, &T::flat(field), Mode::BOTH, &mut results[self.own_places()], point);
-        self.in_memory_order(&mut results, Tiled::share_at_particles);
+        self.in_memory_order(&mut results, |tiled, results| tiled.share_results(Each::Particle, results));
         results
     }
 
@@ -253,18 +249,31 @@ impl<const D: usize> Supports<D> {
         results: &mut [R],
         point: impl Fn(usize, &[At<f64, C, D>], usize) -> R + Sync,
     ) {
-        self.pass();
         let evaluate = |group: Group<'_>, at: &[At<f64, C, D>], results: &mut [R]| {
             for (lane, (&p, result)) in group.particles.iter().zip(results).enumerate() {
                 *result = point(p as usize, at, lane);
             }
         };
-        dispatch!(self, one => one.gather(fields, field, mode, &evaluate, results));
+        self.results(Each::Particle, fields, Some(field), mode, results, evaluate);
+    }
+
+    /// Calls `evaluate(group, u and L of every field, results)` for every group of this process.
+    fn results<R: Send, const C: usize>(
+        &self,
+        each: Each,
+        fields: usize,
+        field: Option<&[f64]>,
+        mode: Mode,
+        results: &mut [R],
+        evaluate: impl Fn(Group<'_>, &[At<f64, C, D>], &mut [R]) + Sync,
+    ) {
+        self.pass();
+        dispatch!(self, one => one.results(each, fields, field, mode, &evaluate, results));
     }
 
     /// Takes the results of other processes by `share`, and moves all results to the order of the particles in memory.
     fn in_memory_order<R: Copy>(&self, results: &mut [R], share: impl FnOnce(&Tiled<D>, &mut [R])) {
-        if let Implementation::Tiled(tiled) = &self.implementation {
+        if let Some(tiled) = self.tiled() {
             share(tiled, results);
             tiled.to_memory_order(results);
         }
@@ -276,7 +285,7 @@ impl<const D: usize> Supports<D> {
     ///
     /// # Errors
     /// The error of the first particle in memory whose `point` fails.
-    pub fn interpolate<T: Number, R: AtParticle, E: Send + Message>(
+    pub fn interpolate<T: Number, R: Copy + Send + Message, E: Send + Message>(
         &self,
         field: &[Vector<T, D>],
         point: impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> Result<R, E> + Sync,
@@ -285,7 +294,7 @@ impl<const D: usize> Supports<D> {
         let results = self.evaluate(field, |p, value, gradient| {
             point(p, value, gradient).unwrap_or_else(|error| {
                 failure.keep(p, error);
-                R::blank()
+                R::unknown()
             })
         });
         failure.check(self.processes())?;

@@ -4,7 +4,7 @@
 use super::blocks::Quadratic;
 use super::group::{At, Group};
 use super::points::{Points, SupportError};
-use super::{Evaluate, Fill, Mode, Point};
+use super::{Each, Evaluate, Mode, Point};
 use crate::approximation::{Scratch, ShapeFunction, Support};
 use crate::grid::Grid;
 use crate::lanes::LANES;
@@ -105,7 +105,7 @@ impl<const D: usize> Plain<D> {
         point: &Point<'_, C, D>,
     ) {
         let evaluate = |group: Group<'_>| {
-            let at = field.map_or_else(|| vec![At::zero(); fields], |field| self.gathered(group, fields, field));
+            let at = self.gathered(group, fields, field);
             let mut sums = vec![At::<f64, C, D>::zero(); fields];
             point(group, &at, &mut sums);
             sums
@@ -143,39 +143,30 @@ impl<const D: usize> Plain<D> {
         });
     }
 
-    /// Calls `evaluate(group, u and L, results)` for every group, with the results of its particles.
-    pub(super) fn gather<R: Send, const C: usize>(
+    /// Calls `evaluate(group, u and L, results)` for every group, with the results of the group.
+    pub(super) fn results<R: Send, const C: usize>(
         &self,
+        each: Each,
         fields: usize,
-        field: &[f64],
+        field: Option<&[f64]>,
         _: Mode,
         evaluate: &Evaluate<'_, R, C, D>,
         results: &mut [R],
     ) {
-        self.write(LANES, results, &|group, results| evaluate(group, &self.gathered(group, fields, field), results));
-    }
-
-    /// Writes `evaluate(group)` of every group, in the order of their numbers.
-    pub(super) fn map_groups<R: Send>(&self, evaluate: &(dyn Fn(Group<'_>) -> R + Sync), results: &mut [R]) {
-        self.write(1, results, &|group, results| results[0] = evaluate(group));
-    }
-
-    pub(super) fn fill_rows(&self, field: &[f64], count: usize, rows: &mut [[f64; LANES]], fill: &Fill<'_, D>) {
-        self.write(count, rows, &|group, rows| fill(group, &self.gathered(group, 1, field)[0], rows));
-    }
-
-    /// Calls `write` for every group with its `count` results.
-    fn write<R: Send>(&self, count: usize, results: &mut [R], write: &(dyn Fn(Group<'_>, &mut [R]) + Sync)) {
+        let count = each.of_group(LANES);
         let tasks = results.chunks_mut(TASK * count).enumerate();
         parallel::for_each(tasks, &|(task, results): (usize, &mut [R])| {
-            let groups = results.chunks_mut(count).enumerate();
-            groups.for_each(|(group, results)| write(self.group(task * TASK + group), results));
+            for (number, results) in results.chunks_mut(count).enumerate() {
+                let group = self.group(task * TASK + number);
+                evaluate(group, &self.gathered(group, fields, field), results);
+            }
         });
     }
 
-    /// u = Σ u_I N_I and L = Σ u_I ⊗ ∇_r N_I of every field at the particles of a group.
-    fn gathered<const C: usize>(&self, group: Group<'_>, fields: usize, field: &[f64]) -> Vec<At<f64, C, D>> {
+    /// u = Σ u_I N_I and L = Σ u_I ⊗ ∇_r N_I of every field at the particles of a group; zero without a field.
+    fn gathered<const C: usize>(&self, group: Group<'_>, fields: usize, field: Option<&[f64]>) -> Vec<At<f64, C, D>> {
         let mut at = vec![At::<f64, C, D>::zero(); fields];
+        let Some(field) = field else { return at };
         for (lane, (node, n, grad_n)) in self.entries_of(group) {
             for (f, at) in at.iter_mut().enumerate() {
                 for c in 0..C {

@@ -8,7 +8,7 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 /// The points where shape functions are evaluated.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Points<'a, const D: usize> {
     /// x of all particles.
     pub positions: Cow<'a, [Vector<f64, D>]>,
@@ -27,13 +27,7 @@ pub struct Points<'a, const D: usize> {
 impl<'a, const D: usize> Points<'a, D> {
     /// The particles at `positions`, none of which is on a loaded surface.
     pub fn at(positions: &'a [Vector<f64, D>]) -> Self {
-        Self {
-            positions: positions.into(),
-            ids: None,
-            extrapolation: BTreeMap::new(),
-            fields: Fields::default(),
-            processes: Processes::default(),
-        }
+        Self { positions: positions.into(), ..Self::default() }
     }
 
     /// The id of a particle, for messages.

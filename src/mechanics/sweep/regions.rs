@@ -10,10 +10,9 @@ use super::group::{At, Group, Window};
 use super::kernel::{self, Gather, Scatter};
 use super::shares::Shares;
 use super::tiled::{RANGE, Tiled};
-use super::{Evaluate, Fill, Mode, Point};
+use super::{Each, Evaluate, Mode, Point};
 use crate::lanes::LANES;
 use crate::parallel::{self, Message};
-use crate::pooled::Pooled;
 use crate::tensor::Tensor;
 
 /// Below this number of groups, waking the threads costs more than the work.
@@ -24,9 +23,6 @@ type Work<'a, S> = dyn Fn(&Block, &mut S, &mut [f64]) + Sync + 'a;
 
 /// `(block, buffer, first, range)`: adds the buffer's entries at the active nodes of the range, which begins at the node `first`.
 type Add<'a> = dyn Fn(&Block, &[f64], usize, &mut [f64]) + Sync + 'a;
-
-/// `(scratch, block, results)`: writes the results of a block's groups.
-type Write<'a, S, R> = dyn Fn(&mut S, &Block, &mut [R]) + Sync + 'a;
 
 impl<const D: usize> Tiled<D> {
     pub(super) fn in_parallel(&self) -> bool {
@@ -123,17 +119,19 @@ impl<const D: usize> Tiled<D> {
         add: &Add<'_>,
     ) {
         let (own, length) = (self.own(), |block: &Block| block.box_nodes() * numbers + more);
-        let Some((first, shares)) = self.shared() else {
-            if self.in_parallel() {
-                let boxes = self.filled_boxes(length, work);
-                self.add_boxes(numbers, out, &boxed(own, length, &boxes), 0, add);
-            } else {
-                self.add_in_turn(length, out, work, add);
-            }
-            return;
-        };
-        let boxes = self.filled_boxes(length, work);
+        let shared = self.shared();
+        if shared.is_none() && !self.in_parallel() {
+            return self.add_in_turn(length, out, work, add);
+        }
+        let mut boxes = self.pool.unspecified(own.iter().map(length).sum(), 0.0);
+        let mut left = &mut boxes[..];
+        let parts = own.iter().filter_map(|block| Some((block, left.split_off_mut(..length(block))?)));
+        parallel::for_each_with(parts, &|scratch, (block, buffer): (&Block, &mut [f64])| {
+            buffer.fill(0.0);
+            work(block, scratch, buffer);
+        });
         let boxes = boxed(own, length, &boxes);
+        let Some((first, shares)) = shared else { return self.add_boxes(numbers, out, &boxes, 0, add) };
         let before = shares.at_interface(numbers, out);
         self.add_boxes(numbers, out, &boxes, first, add);
         shares.complete(numbers, (out, &before), &self.pool, &|block, node, entry| {
@@ -164,19 +162,6 @@ impl<const D: usize> Tiled<D> {
         }
     }
 
-    /// The boxes of all own blocks, one after the other.
-    fn filled_boxes<S: Default + Send>(&self, length: impl Fn(&Block) -> usize, work: &Work<'_, S>) -> Pooled<f64> {
-        let own = self.own();
-        let mut boxes = self.pool.unspecified(own.iter().map(&length).sum(), 0.0);
-        let mut left = &mut boxes[..];
-        let parts = own.iter().filter_map(|block| Some((block, left.split_off_mut(..length(block))?)));
-        parallel::for_each_with(parts, &|scratch, (block, buffer): (&Block, &mut [f64])| {
-            buffer.fill(0.0);
-            work(block, scratch, buffer);
-        });
-        boxes
-    }
-
     /// Adds the boxes of all own blocks, the first of which has the number `first`.
     fn add_boxes(&self, numbers: usize, out: &mut [f64], boxes: &[&[f64]], first: usize, add: &Add<'_>) {
         let ranges = out.chunks_mut(RANGE * numbers).zip(&self.ranges).enumerate();
@@ -187,80 +172,52 @@ impl<const D: usize> Tiled<D> {
         });
     }
 
-    /// Calls `evaluate(group, u and L, results)` for every own group, with the results of its particles. They lie in the order of the groups.
-    pub(super) fn gather<R: Send, const C: usize>(
+    /// Calls `evaluate(group, u and L, results)` for every own group, with the results of the group. They lie in the order of the groups.
+    pub(super) fn results<R: Send, const C: usize>(
         &self,
+        each: Each,
         fields: usize,
-        field: &[f64],
+        field: Option<&[f64]>,
         mode: Mode,
         evaluate: &Evaluate<'_, R, C, D>,
-        results: &mut [R],
-    ) {
-        let one = |scratch: &mut Scratch<C, D>, block: &Block, mut results: &mut [R]| {
-            gathered(block, field, fields, mode, scratch, |group, at| {
-                let own = results.split_off_mut(..group.particles.len());
-                own.into_iter().for_each(|own| evaluate(group, at, own));
-            });
-        };
-        self.write(Block::count, results, &one);
-    }
-
-    /// Takes the results at the particles of other processes.
-    pub(super) fn share_at_particles<R: Message>(&self, results: &mut [R]) {
-        if let Some((_, shares)) = self.shared() {
-            shares.share_results(&self.blocks, Block::count, results);
-        }
-    }
-
-    /// [`Self::share_at_particles`] for `count` plain numbers at each particle, in place.
-    pub(super) fn share_numbers(&self, count: usize, numbers: &mut [f64]) {
-        if let Some((_, shares)) = self.shared() {
-            shares.share_numbers(&self.blocks, |block| block.count() * count, numbers);
-        }
-    }
-
-    /// Writes `evaluate(group)` of every group, in the order of their numbers.
-    pub(super) fn map_groups<R: Message + Send>(&self, evaluate: &(dyn Fn(Group<'_>) -> R + Sync), results: &mut [R]) {
-        let one = |(): &mut (), block: &Block, results: &mut [R]| {
-            results.iter_mut().enumerate().for_each(|(group, result)| *result = evaluate(block.group(group)));
-        };
-        self.write(Block::len, &mut results[self.own_groups()], &one);
-        if let Some((_, shares)) = self.shared() {
-            shares.share_results(&self.blocks, Block::len, results);
-        }
-    }
-
-    /// Calls `write` for every own block with its results, which are `count(block)` in number. There are results of own blocks alone.
-    fn write<S: Default + Send, R: Send>(
-        &self,
-        count: impl Fn(&Block) -> usize,
         mut results: &mut [R],
-        write: &Write<'_, S, R>,
     ) {
-        let parts = self.own().iter().filter_map(|block| Some((block, results.split_off_mut(..count(block))?)));
+        let work = |scratch: &mut Scratch<C, D>, (block, mut results): (&Block, &mut [R])| {
+            let Scratch { nodal, at, .. } = scratch;
+            at.resize(fields, At::zero());
+            if let Some(field) = field {
+                gather_boxes::<C>(block, field, fields, nodal);
+            }
+            for number in 0..block.len() {
+                let group = block.group(number);
+                if field.is_some() {
+                    gather(block.window::<D>(number), nodal, mode, at);
+                }
+                let own = results.split_off_mut(..each.of_group(group.particles.len()));
+                own.into_iter().for_each(|own| evaluate(group, at, own));
+            }
+        };
+        let part = |block| Some((block, results.split_off_mut(..each.of_block(block))?));
+        let parts = self.own().iter().filter_map(part);
         if self.in_parallel() {
-            parallel::for_each_with(parts, &|scratch, (block, results)| write(scratch, block, results));
+            parallel::for_each_with(parts, &work);
         } else {
-            let mut scratch = S::default();
-            parts.for_each(|(block, results)| write(&mut scratch, block, results));
+            let mut scratch = Scratch::default();
+            parts.for_each(|part| work(&mut scratch, part));
         }
     }
 
-    /// Calls `fill(group, L, rows)` for every own group. Each of them has `count` rows.
-    pub(super) fn fill_rows(&self, field: &[f64], count: usize, rows: &mut [[f64; LANES]], fill: &Fill<'_, D>) {
-        let one = |scratch: &mut Scratch<D, D>, block: &Block, rows: &mut [[f64; LANES]]| {
-            let mut rows = rows.chunks_mut(count);
-            gathered(block, field, 1, Mode::GRADIENT, scratch, |group, at| {
-                rows.next().into_iter().for_each(|rows| fill(group, &at[0], rows));
-            });
-        };
-        self.write(|block| block.len() * count, rows, &one);
+    /// Takes the results of other processes.
+    pub(super) fn share_results<R: Message>(&self, each: Each, results: &mut [R]) {
+        if let Some((_, shares)) = self.shared() {
+            shares.share_results(&self.blocks, |block| each.of_block(block), results);
+        }
     }
 
-    /// Tells all processes the rows that they have filled, `count` for each group.
-    pub(super) fn share_rows(&self, count: usize, rows: &mut [[f64; LANES]]) {
+    /// [`Self::share_results`] for results of `count` plain numbers, in place.
+    pub(super) fn share_numbers(&self, each: Each, count: usize, numbers: &mut [f64]) {
         if let Some((_, shares)) = self.shared() {
-            shares.share_numbers(&self.blocks, |block| block.len() * count * LANES, rows.as_flattened_mut());
+            shares.share_numbers(&self.blocks, |block| each.of_block(block) * count, numbers);
         }
     }
 }
@@ -301,22 +258,5 @@ fn gather_boxes<const C: usize>(block: &Block, field: &[f64], fields: usize, nod
 fn gather<const C: usize, const D: usize>(window: Window<'_>, nodal: &[f64], mode: Mode, at: &mut [At<f64, C, D>]) {
     for (nodal, At { value, gradient }) in nodal.chunks(nodal.len() / at.len()).zip(at) {
         kernel::gather(C, Gather { window, nodal, mode, value, gradient: gradient.as_flattened_mut() });
-    }
-}
-
-/// Calls `visit(group, u and L)` for every group of a block.
-fn gathered<const C: usize, const D: usize>(
-    block: &Block,
-    field: &[f64],
-    fields: usize,
-    mode: Mode,
-    Scratch { nodal, at, .. }: &mut Scratch<C, D>,
-    mut visit: impl FnMut(Group<'_>, &[At<f64, C, D>]),
-) {
-    gather_boxes::<C>(block, field, fields, nodal);
-    at.resize(fields, At::zero());
-    for group in 0..block.len() {
-        gather(block.window::<D>(group), nodal, mode, at);
-        visit(block.group(group), at);
     }
 }

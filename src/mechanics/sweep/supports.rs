@@ -4,13 +4,13 @@ use super::columns::WIDEST;
 use super::group::Group;
 use super::plain::Plain;
 use super::points::{Points, SupportError};
-use super::shares;
 use super::tiled::Tiled;
+use super::{Each, shares};
 use crate::aggregation::Extension;
 use crate::approximation::ShapeFunction;
 use crate::gpu::{Gpu, Masses, Transfer};
 use crate::grid::Grid;
-use crate::parallel::{Message, Processes};
+use crate::parallel::Processes;
 use crate::pooled::{Element, Pool, Pooled};
 use crate::scalar::Real;
 use crate::space::{Nodes, Space};
@@ -38,7 +38,6 @@ use std::sync::{Arc, OnceLock};
 /// let x: Vec<_> = nodes.positions(&grid).map(|(_, x)| x).collect();
 /// let apart = supports.values(&x).iter().zip(&positions).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
 /// assert!(apart < 1e-13);
-/// assert!((supports.value_at(7, &x) - positions[7]).norm() < 1e-13);
 /// assert!((supports.gradient_at(7, &x) - identity()).norm() < 1e-12);
 /// let sum: f64 = supports.of(7).map(|(_, n, _)| n).sum();
 /// assert!((sum - 1.0).abs() < 1e-14);
@@ -129,26 +128,21 @@ impl<const D: usize> Supports<D> {
         points: &Points<'_, D>,
         pool: &Pool,
     ) -> Result<(Self, Nodes), SupportError> {
-        match approximation.separable() {
+        let (implementation, nodes) = match approximation.separable() {
             Some(product) if product.width() <= WIDEST => {
                 let reused = reused.and_then(|reused| match reused.implementation {
                     Implementation::Plain(_) => None,
                     Implementation::Tiled(tiled) => Some(tiled),
                 });
                 let (tiled, nodes) = Tiled::new(approximation, product, grid, points, reused, pool)?;
-                Ok((
-                    Self::of_implementation(Implementation::Tiled(tiled), grid, &nodes, pool).with_fields(points),
-                    nodes,
-                ))
+                (Implementation::Tiled(tiled), nodes)
             }
             _ => {
                 let (plain, nodes) = Plain::new(approximation, grid, points)?;
-                Ok((
-                    Self::of_implementation(Implementation::Plain(plain), grid, &nodes, pool).with_fields(points),
-                    nodes,
-                ))
+                (Implementation::Plain(plain), nodes)
             }
-        }
+        };
+        Ok((Self::of_implementation(implementation, grid, &nodes, points, pool), nodes))
     }
 
     /// [`Self::new`] with the plain loop for every shape function. The plain loop is the specification of the fast one.
@@ -185,15 +179,30 @@ impl<const D: usize> Supports<D> {
         grid: &Grid<D>,
         positions: &[Vector<f64, D>],
     ) -> Result<(Self, Nodes), SupportError> {
-        let (plain, nodes) = Plain::new(approximation, grid, &Points::at(positions))?;
-        Ok((Self::of_implementation(Implementation::Plain(plain), grid, &nodes, &Pool::default()), nodes))
+        let points = Points::at(positions);
+        let (plain, nodes) = Plain::new(approximation, grid, &points)?;
+        Ok((Self::of_implementation(Implementation::Plain(plain), grid, &nodes, &points, &Pool::default()), nodes))
     }
 
-    fn of_implementation(implementation: Implementation<D>, grid: &Grid<D>, nodes: &Nodes, pool: &Pool) -> Self {
-        let (nodes, passes, pool) = (nodes.clone(), AtomicU64::new(0), pool.clone());
-        let (fields, gpu, on_device, masses_on_device) = (Vec::new(), None, OnceLock::new(), OnceLock::new());
-        let extension = None;
+    fn of_implementation(
+        implementation: Implementation<D>,
+        grid: &Grid<D>,
+        nodes: &Nodes,
+        points: &Points<'_, D>,
+        pool: &Pool,
+    ) -> Self {
+        let (nodes, fields, pool) = (nodes.clone(), points.fields.of_body.clone(), pool.clone());
+        let (passes, on_device, masses_on_device) = (AtomicU64::new(0), OnceLock::new(), OnceLock::new());
+        let (extension, gpu) = (None, None);
         Self { implementation, grid: *grid, nodes, fields, passes, pool, extension, gpu, on_device, masses_on_device }
+    }
+
+    /// The fast loop, if the shape functions are products.
+    pub(super) fn tiled(&self) -> Option<&Tiled<D>> {
+        match &self.implementation {
+            Implementation::Plain(_) => None,
+            Implementation::Tiled(tiled) => Some(tiled),
+        }
     }
 
     /// These supports with an extension u = E û: outer nodes follow inner ones, and equilibria are solved for the inner nodes alone.
@@ -240,8 +249,8 @@ impl<const D: usize> Supports<D> {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn block_order(&self) -> Option<Vec<u32>> {
-        let Implementation::Tiled(tiled) = &self.implementation else { return None };
-        (!tiled.is_memory_order).then(|| tiled.order().collect())
+        let tiled = self.tiled().filter(|tiled| !tiled.is_memory_order)?;
+        Some(tiled.order().collect())
     }
 
     /// Renumbers the particles after they have been put into [`Self::block_order`].
@@ -304,7 +313,7 @@ impl<const D: usize> Supports<D> {
 
     /// Whether shape functions are stored by axis, as products are.
     pub fn is_tiled(&self) -> bool {
-        matches!(self.implementation, Implementation::Tiled(_))
+        self.tiled().is_some()
     }
 
     /// Calls `visit` for all groups, in the order of their numbers.
@@ -312,71 +321,44 @@ impl<const D: usize> Supports<D> {
         dispatch!(self, one => one.each_group(&mut visit));
     }
 
-    /// `evaluate(group)` of all groups, in the order of their numbers.
-    pub(crate) fn map_groups<R: Clone + Default + Send + Message>(
-        &self,
-        evaluate: impl Fn(Group<'_>) -> R + Sync,
-    ) -> Vec<R> {
-        let mut results = vec![R::default(); self.groups()];
-        dispatch!(self, one => one.map_groups(&evaluate, &mut results));
-        results
-    }
-
     /// The processes that share the passes.
     pub(crate) fn processes(&self) -> &Processes {
-        match &self.implementation {
-            // The plain loop is not shared: every process runs the whole loop.
-            Implementation::Plain(_) => const { &Processes::ALONE },
-            Implementation::Tiled(tiled) => tiled.processes(),
-        }
+        // The plain loop is not shared: every process runs the whole loop.
+        self.tiled().map_or(const { &Processes::ALONE }, Tiled::processes)
     }
 
     /// The particles of this process by their index in memory, if particles lie in the order of the blocks; otherwise all particles.
     pub(crate) fn own_particles(&self) -> Range<usize> {
-        match &self.implementation {
-            Implementation::Plain(plain) => 0..plain.particles(),
-            Implementation::Tiled(tiled) => tiled.own_particles(),
-        }
+        self.tiled().map_or(0..self.particles(), Tiled::own_particles)
     }
 
     /// The places of this process's particles in the order of the passes.
     pub(super) fn own_places(&self) -> Range<usize> {
-        match &self.implementation {
-            Implementation::Plain(plain) => 0..plain.particles(),
-            Implementation::Tiled(tiled) => tiled.own_places(),
-        }
+        self.tiled().map_or(0..self.particles(), Tiled::own_places)
     }
 
     /// Whether the particles lie in memory in the order of the passes.
     pub(super) fn is_memory_order(&self) -> bool {
-        match &self.implementation {
-            Implementation::Plain(_) => true,
-            Implementation::Tiled(tiled) => tiled.is_memory_order,
-        }
+        self.tiled().is_none_or(|tiled| tiled.is_memory_order)
     }
 
     /// The groups of this process.
     pub(crate) fn own_groups(&self) -> Range<usize> {
-        match &self.implementation {
-            Implementation::Plain(plain) => 0..plain.groups(),
-            Implementation::Tiled(tiled) => tiled.own_groups(),
-        }
+        self.tiled().map_or(0..self.groups(), Tiled::own_groups)
     }
 
     /// Each process has written `count` numbers for each of its [own particles](Self::own_particles). Fills in the numbers of the others.
     pub(crate) fn share_particles(&self, count: usize, numbers: &mut [f64]) {
-        if let Implementation::Tiled(tiled) = &self.implementation {
-            tiled.share_particles(count, numbers);
+        if let Some(tiled) = self.tiled().filter(|tiled| tiled.is_memory_order) {
+            tiled.share_numbers(Each::Particle, count, numbers);
         }
     }
 
     /// The largest number of particles of a process, and the most entries of nodes that a process tells after a scatter, if so many processes
     /// share the passes. The plain loop is not shared.
     pub(crate) fn largest_shares(&self, processes: usize) -> [usize; 2] {
-        match &self.implementation {
-            Implementation::Plain(plain) => [plain.particles(), 0],
-            Implementation::Tiled(tiled) => shares::largest(processes, &tiled.blocks, self.nodes.len()),
-        }
+        let of_tiled = |tiled: &Tiled<D>| shares::largest(processes, &tiled.blocks, self.nodes.len());
+        self.tiled().map_or([self.particles(), 0], of_tiled)
     }
 
     /// Number of groups.
@@ -389,10 +371,7 @@ impl<const D: usize> Supports<D> {
     ///
     /// Example: [`Self::plain`].
     pub fn windows(&self) -> Vec<([usize; 3], usize)> {
-        match &self.implementation {
-            Implementation::Plain(_) => Vec::new(),
-            Implementation::Tiled(tiled) => tiled.windows(),
-        }
+        self.tiled().map_or_else(Vec::new, Tiled::windows)
     }
 
     /// Bytes of all arrays.
@@ -404,10 +383,8 @@ impl<const D: usize> Supports<D> {
 
     /// Bytes of the boxes into which all blocks scatter at the same time. With one thread in one process, the blocks share a box.
     pub(crate) fn box_bytes(&self, processes: usize) -> usize {
-        match &self.implementation {
-            Implementation::Tiled(tiled) if processes > 1 || tiled.in_parallel() => tiled.box_bytes(),
-            _ => 0,
-        }
+        let tiled = self.tiled().filter(|tiled| processes > 1 || tiled.in_parallel());
+        tiled.map_or(0, Tiled::box_bytes)
     }
 
     /// The entries (active node, N, ∇_r N) of one particle.
@@ -416,7 +393,7 @@ impl<const D: usize> Supports<D> {
     }
 
     /// Σ N_I u_I at one particle.
-    pub fn value_at<T: Real>(&self, particle: usize, field: &[Vector<T, D>]) -> Vector<T, D> {
+    pub(crate) fn value_at<T: Real>(&self, particle: usize, field: &[Vector<T, D>]) -> Vector<T, D> {
         let mut value = Vector::<T, D>::zeros();
         for (node, n, _) in self.of(particle) {
             value += field[node] * T::lit(n);

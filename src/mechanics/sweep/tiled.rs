@@ -142,13 +142,6 @@ impl<const D: usize> Tiled<D> {
         if self.is_memory_order { self.own_places() } else { 0..self.particles() }
     }
 
-    /// See [`super::Supports::share_particles`].
-    pub(super) fn share_particles(&self, count: usize, numbers: &mut [f64]) {
-        if self.is_memory_order {
-            self.share_numbers(count, numbers);
-        }
-    }
-
     /// The particles, block by block and group by group.
     pub(super) fn order(&self) -> impl Iterator<Item = u32> {
         self.keys.iter().map(|key| key.particle)

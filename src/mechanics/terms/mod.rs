@@ -21,8 +21,9 @@ mod stress;
 mod term;
 
 pub(crate) use contact::{ContactForce, penalties};
-pub(crate) use planned::planned;
-pub use term::{AtPoints, Piece, Role, Step, Sum};
+pub(crate) use planned::{Reason, planned};
+pub(crate) use term::{AtPoints, Sum};
+pub use term::{Piece, Role, Step};
 
 use damping::Damping;
 use dead_load::DeadLoad;
@@ -185,7 +186,7 @@ impl<'a, const D: usize, L: Law> Terms<'a, D, L> {
     /// Linearises all terms, or one piece.
     pub(crate) fn linearize(&self, piece: Option<Piece>, at: Trial<'_, f64, D>) -> Result<Linearized<D>, Inadmissible> {
         let part = piece.map_or(Part::Whole, |piece| piece.part);
-        let mut linearized = Linearized::zero();
+        let mut linearized = Linearized::default();
         for any in self.picked(|name, _| piece.is_none_or(|piece| piece.term == name)) {
             of_term!(any, term => term.linearize(at, part, &mut linearized))?;
         }

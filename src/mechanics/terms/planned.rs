@@ -16,7 +16,7 @@ pub(crate) fn planned<const D: usize>(
     may_reset: bool,
 ) -> Vec<Reason> {
     let moves = scheme.has_inertia();
-    let inertia = |why: String| if moves { why } else { format!("time.scheme says none: {scheme}") };
+    let inertia = |why: String| if moves { why } else { format!("time.scheme says none: {}", scheme.name()) };
     let mean = match averages {
         false => "only with volumetric = \"mean_dilatation\" of a body",
         true => "one change of volume for the particles of a cell; a pass more a residual and a product",
@@ -36,7 +36,7 @@ pub(crate) fn planned<const D: usize>(
     let slides = if loads.contacts.have_friction() { "; friction makes the tangent unsymmetric" } else { "" };
     let touched = format!("{points} points of surfaces; obstacles: {obstacles}; pairs of bodies: {pairs}{slides}");
     vec![
-        ("inertia, lumped", moves && lumping > 0.0, inertia(format!("time.lumping = {lumping}, {scheme}"))),
+        ("inertia, lumped", moves && lumping > 0.0, inertia(format!("time.lumping = {lumping}, {}", scheme.name()))),
         (
             "inertia, consistent",
             moves && lumping < 1.0,

@@ -5,7 +5,7 @@ use crate::lanes::LANES;
 use crate::material::Law;
 use crate::mechanics::constitutive::{Laws, Part};
 use crate::mechanics::kinematics::{Inadmissible, Kinematics};
-use crate::mechanics::linearized::{Linearized, StressRows};
+use crate::mechanics::linearized::{Linearized, Rows};
 use crate::mechanics::sweep::{Mode, Number, Supports, Weights};
 use crate::mechanics::trial::Trial;
 use crate::parallel::First;
@@ -28,7 +28,7 @@ impl<'a, const D: usize, L: Law> Stress<'a, D, L> {
     }
 
     /// The tangent linearised at φ, whole or one `part`.
-    pub(super) fn linearized(&self, phi: &[Vector<f64, D>], part: Part) -> Result<StressRows, Inadmissible> {
+    pub(super) fn linearized(&self, phi: &[Vector<f64, D>], part: Part) -> Result<Rows, Inadmissible> {
         let form = self.laws.form();
         let count = form.rows(D);
         let own = self.supports.own_groups();
@@ -41,7 +41,7 @@ impl<'a, const D: usize, L: Law> Stress<'a, D, L> {
             }
         });
         failure.check(self.supports.processes())?;
-        Ok(StressRows::new(form, own.start, rows))
+        Ok(Rows::new(form, own.start, count, rows))
     }
 }
 

@@ -103,27 +103,11 @@ impl<const D: usize> Nodal<D> {
     }
 
     /// The lumped mass alone, which gravity acts on: there is no inertia.
-    ///
-    /// ```
-    /// use bfree::mechanics::{sweep::Supports, transfer::Nodal};
-    ///
-    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
-    /// let simulation = scene.build::<2>("scenes".as_ref())?;
-    /// let particles = &simulation.particles;
-    /// let (supports, _) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
-    /// // The mass is there, and no velocity or acceleration.
-    /// let nodal = Nodal::mass_alone(particles, &supports);
-    /// assert!((nodal.mass.iter().sum::<f64>() / particles.mass.iter().sum::<f64>() - 1.0).abs() < 1e-14);
-    /// assert!(nodal.is_static() && !Nodal::at_rest(particles, &supports).is_static());
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    pub fn mass_alone(particles: &Particles<D>, supports: &Supports<D>) -> Self {
+    pub(crate) fn mass_alone(particles: &Particles<D>, supports: &Supports<D>) -> Self {
         Self { mass: lumped(particles, supports), ..Self::default() }
     }
 
     /// Whether there is no inertia.
-    ///
-    /// Example: [`Self::mass_alone`].
     pub fn is_static(&self) -> bool {
         self.velocity.is_empty()
     }
@@ -167,30 +151,14 @@ impl<const D: usize> Nodal<D> {
     /// Applies E to velocity and acceleration, so that outer nodes follow the prescribed values of inner nodes.
     pub(crate) fn extended(mut self, space: &Space<D>) -> Self {
         if !self.is_static() {
-            space.extend(&mut self.velocity);
-            space.extend(&mut self.acceleration);
+            space.followers().extend(&mut self.velocity);
+            space.followers().extend(&mut self.acceleration);
         }
         self
     }
 
     /// This state with ġ(t_n), g̈(t_n) in place of the projected values at prescribed degrees of freedom.
-    ///
-    /// ```
-    /// use bfree::mechanics::{loads::{MotionStep, PrescribedDof}, sweep::Supports, transfer::Nodal};
-    ///
-    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
-    /// let simulation = scene.build::<2>("scenes".as_ref())?;
-    /// let particles = &simulation.particles;
-    /// let (supports, _) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
-    /// let projected = Nodal::project(particles, &supports, 1.0)?;
-    /// // A wall holds the x component of node 3.
-    /// let wall = PrescribedDof { node: 3, component: 0, owner: 0, moving: false, step: MotionStep::default() };
-    /// let nodal = projected.with_prescribed(&[wall]);
-    /// assert_eq!((nodal.velocity[3][0], nodal.velocity[3][1]), (0.0, projected.velocity[3][1]));
-    /// assert_eq!(nodal.velocity[4], projected.velocity[4]);
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    pub fn with_prescribed(&self, prescribed: &[PrescribedDof]) -> Self {
+    pub(crate) fn with_prescribed(&self, prescribed: &[PrescribedDof]) -> Self {
         let mut overwritten = self.clone();
         for dof in prescribed.iter().filter(|_| !self.is_static()) {
             overwritten.velocity[dof.node][dof.component] = dof.step.velocity_start;
@@ -203,11 +171,11 @@ impl<const D: usize> Nodal<D> {
 /// Replaces p by E û with Eᵀ m û = Eᵀ p; û is zero at light nodes.
 fn divide<const D: usize>(particles: &Particles<D>, space: &Space<D>, mass: &[f64], p: &mut [Vector<f64, D>]) {
     let is_light = is_light(particles);
-    space.restrict(p);
+    space.followers().restrict(p);
     for (p, &m) in p.iter_mut().zip(&*restricted(space, mass)) {
         *p = if is_light(m) { Vector::zeros() } else { *p / m };
     }
-    space.extend(p);
+    space.followers().extend(p);
 }
 
 /// The particle-to-grid transfer of velocity and acceleration.
@@ -222,4 +190,28 @@ pub enum Projection {
     /// momentum is about a tenth of that of `mass`. Each step needs some more passes over the particles. `time.lumping` then acts on the
     /// inertia alone.
     Affine,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gravity_without_inertia_has_the_mass_alone_and_walls_hold_one_component()
+    -> Result<(), Box<dyn std::error::Error>> {
+        use crate::mechanics::loads::MotionStep;
+        let scene = crate::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+        let simulation = scene.build::<2>("scenes".as_ref())?;
+        let particles = &simulation.particles;
+        let (supports, _) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
+        let alone = Nodal::mass_alone(particles, &supports);
+        assert!((alone.mass.iter().sum::<f64>() / particles.mass.iter().sum::<f64>() - 1.0).abs() < 1e-14);
+        assert!(alone.is_static() && !Nodal::at_rest(particles, &supports).is_static());
+        let projected = Nodal::project(particles, &supports, 1.0)?;
+        let wall = PrescribedDof { node: 3, component: 0, owner: 0, moving: false, step: MotionStep::default() };
+        let nodal = projected.with_prescribed(&[wall]);
+        assert_eq!((nodal.velocity[3][0], nodal.velocity[3][1]), (0.0, projected.velocity[3][1]));
+        assert_eq!(nodal.velocity[4], projected.velocity[4]);
+        Ok(())
+    }
 }

@@ -55,7 +55,6 @@ pub struct Committed {
 /// let alphas = simulation.settings.scheme.end(dt);
 /// let mut update = Update::new(&alphas, &nodal, &nodal, &[], WallUpdate::Literal, &dphi);
 /// update.smooth(&Smoothing::limited(40.0), &particles, &supports, &nodal.mass, dt);
-/// assert_eq!(update.leaving(&particles, &supports, &simulation.grid), None);
 /// update.commit(&mut particles, &simulation.bodies, &supports, dt);
 /// let flown = particles.position[7] - simulation.particles.position[7] - particles.velocity[7] * dt;
 /// assert!(flown.norm() < 1e-14);
@@ -67,6 +66,7 @@ pub struct Committed {
 /// assert!(whole.position.iter().zip(&particles.position).all(|(a, b)| (a - b).norm() < 1e-12));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
+#[derive(Default)]
 pub struct Update<'a, const D: usize> {
     dphi: &'a [Vector<f64, D>],
     /// φ = φ_n + Δφ; `None` right after a grid reset.
@@ -128,20 +128,7 @@ impl<'a, const D: usize> Update<'a, D> {
             kept = Some(nodal.motion.pool().collect(sums));
             mutant!("transfer: the end of a step forgets the motion on a kept grid": { kept = Some(nodal.motion.pool().collect(dphi.iter().copied())); });
         }
-        let (dilatation, smoothed, memory) = (Vec::new(), None, None);
-        let (moved, gradients) = (OnceCell::new(), OnceCell::new());
-        Self {
-            dphi,
-            kept,
-            dilatation,
-            delta_velocity,
-            delta_acceleration,
-            impulses,
-            smoothed,
-            memory,
-            moved,
-            gradients,
-        }
+        Self { dphi, kept, delta_velocity, delta_acceleration, impulses, ..Self::default() }
     }
 
     /// The update with dilatations of averaged cells that are unknowns of their own.
@@ -160,13 +147,13 @@ impl<'a, const D: usize> Update<'a, D> {
             return self;
         }
         let mut by_forces = self.delta_velocity.clone();
-        space.extend(&mut self.delta_velocity);
-        space.extend(&mut self.delta_acceleration);
+        space.followers().extend(&mut self.delta_velocity);
+        space.followers().extend(&mut self.delta_acceleration);
         // The change of outer nodes that follow a wall node is an impulse of the wall, too.
         by_forces.iter_mut().zip(&self.delta_velocity).zip(&nodal.mass).for_each(|((before, after), &m)| {
             *before = (after - *before) * m;
         });
-        space.restrict(&mut by_forces);
+        space.followers().restrict(&mut by_forces);
         for (&(node, component), impulse) in space.prescribed().iter().zip(&mut self.impulses) {
             *impulse += by_forces[node][component];
         }
@@ -177,25 +164,7 @@ impl<'a, const D: usize> Update<'a, D> {
     /// over the mass. The error is the difference to Taylor's series with the third derivative ȧ = Δa/Δt: e = c Δt² Δa, exact to leading
     /// order in Δt. The `constant` c is that of the scheme, β − 1/6 for Newmark. A resting wall that leaves the particles' acceleration
     /// alone adds no error, and neither does smoothing.
-    ///
-    /// ```
-    /// use bfree::mechanics::{schemes::Newmark, sweep::Supports, transfer::{Nodal, Update, WallUpdate}};
-    /// use bfree::tensor::Vector;
-    ///
-    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
-    /// let simulation = scene.build::<2>("scenes".as_ref())?;
-    /// let (particles, dt) = (&simulation.particles, 0.05);
-    /// let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
-    /// let (nodal, newmark) = (Nodal::at_rest(particles, &supports), Newmark::default());
-    /// // From rest to the acceleration a within the step: Δφ = β Δt² a, and a third derivative a/Δt.
-    /// let (a, Newmark { beta, .. }) = (Vector::from([3.0, 4.0]), newmark);
-    /// let dphi = vec![a * (beta * dt * dt); nodes.len()];
-    /// let update = Update::new(&newmark.alphas(dt), &nodal, &nodal, &[], WallUpdate::Literal, &dphi);
-    /// let error = update.local_error(particles, &supports, beta - 1.0 / 6.0, dt);
-    /// assert!((error / ((beta - 1.0 / 6.0) * dt * dt * a.norm()) - 1.0).abs() < 1e-12);
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    pub fn local_error(&self, particles: &Particles<D>, supports: &Supports<D>, constant: f64, dt: f64) -> f64 {
+    pub(crate) fn local_error(&self, particles: &Particles<D>, supports: &Supports<D>, constant: f64, dt: f64) -> f64 {
         let mass = &particles.mass;
         let mut squares = 0.0;
         if !self.delta_acceleration.is_empty() {
@@ -264,7 +233,7 @@ impl<'a, const D: usize> Update<'a, D> {
     }
 
     /// The particle with the smallest id of those that would leave the grid: its id, and its position outside.
-    pub fn leaving(
+    pub(crate) fn leaving(
         &self,
         particles: &Particles<D>,
         supports: &Supports<D>,
@@ -405,4 +374,26 @@ fn yielding<const D: usize, L: Law>(particles: &Particles<D>, bodies: &[Body<L>]
         }
     }
     if plastic > 0.0 { yielding / plastic } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_error_of_a_third_derivative_is_the_difference_to_taylors_series() -> Result<(), Box<dyn std::error::Error>> {
+        use crate::mechanics::schemes::Newmark;
+        let scene = crate::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+        let simulation = scene.build::<2>("scenes".as_ref())?;
+        let (particles, dt) = (&simulation.particles, 0.05);
+        let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
+        let (nodal, newmark) = (Nodal::at_rest(particles, &supports), Newmark::default());
+        // From rest to the acceleration a within the step: Δφ = β Δt² a, and a third derivative a/Δt.
+        let (a, beta) = (Vector::from([3.0, 4.0]), newmark.beta);
+        let dphi = vec![a * (beta * dt * dt); nodes.len()];
+        let update = Update::new(&newmark.alphas(dt), &nodal, &nodal, &[], WallUpdate::Literal, &dphi);
+        let error = update.local_error(particles, &supports, beta - 1.0 / 6.0, dt);
+        assert!((error / ((beta - 1.0 / 6.0) * dt * dt * a.norm()) - 1.0).abs() < 1e-12);
+        Ok(())
+    }
 }

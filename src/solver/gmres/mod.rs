@@ -3,8 +3,7 @@
 #[cfg(test)]
 mod tests;
 
-use super::{InvalidSetting, LinearError, LinearOperator, LinearOutcome, LinearReport, begin, true_residual};
-use crate::pooled::Pool;
+use super::{InvalidSetting, LinearError, LinearOutcome, LinearReport, System, begin};
 use crate::space::vector::Vectors;
 
 /// A vector is orthogonalised a second time if the first time leaves less than this part of it: 1/√2 (Daniel, Gragg, Kaufman,
@@ -20,7 +19,7 @@ const STAGNATION: f64 = 0.999;
 /// A cycle was too short if the best solution in its Krylov space leaves more than this part of the residual. The next is twice as long.
 const TOO_SHORT: f64 = 0.9;
 
-/// Settings of [`gmres`].
+/// Settings of restarted GMRES.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GmresSettings {
     /// Wanted ‖b − A x‖ / ‖b‖, in [0, 1).
@@ -32,69 +31,47 @@ pub struct GmresSettings {
     pub restart: usize,
 }
 
-/// Solves A x = b from x = 0 by GMRES(m) on A M⁻¹. Its residual is the true residual.
-///
-/// 1. r = b − A x, v₁ = r/‖r‖.
-/// 2. w = A M⁻¹ vⱼ is made orthogonal to v₁ … vⱼ by modified Gram–Schmidt, twice if much cancels. This gives column j of H, and vⱼ₊₁.
-/// 3. Givens rotations keep H triangular and give the residual norm without x.
-/// 4. After m iterations, or at the tolerance, or when the space is exhausted: x ← x + M⁻¹ V y with H y = ‖r‖ e₁.
-/// 5. The residual is computed anew from x. If it does not meet the tolerance, the method goes back to 1.
-/// 6. If the best solution in the space of a whole cycle is hardly better than x, m is doubled. Null modes and clustered small eigenvalues
-///    need longer cycles, and a failed solve costs more than a few vectors.
-/// 7. Otherwise a cycle that hardly lowers the true residual has met round-off or an exhausted space. It ends the iteration as
-///    [`LinearOutcome::Stagnated`]. A cycle that raises the true residual is undone.
-///
-/// `solution` is overwritten, and its former contents do not matter. b = 0 gives x = 0 without iterating.
-///
-/// ```
-/// use bfree::pooled::Pool;
-/// use bfree::solver::{GmresSettings, Identity, LinearOperator, gmres};
-///
-/// /// A quarter turn and a stretch: not symmetric, so conjugate gradients would not do.
-/// struct Turn;
-///
-/// impl LinearOperator for Turn {
-///     fn apply(&self, x: &[f64], y: &mut [f64]) {
-///         (y[0], y[1]) = (-2.0 * x[1], 2.0 * x[0]);
-///     }
-/// }
-///
-/// let mut x = [0.0; 2];
-/// let settings = GmresSettings { relative_tolerance: 1e-8, max_iterations: 10, restart: 30 };
-/// let report = gmres(&Turn, &Identity, &[-6.0, 8.0], &mut x, &settings, &Pool::default())?;
-/// // Without rounding, a matrix of order n takes n iterations.
-/// assert!(report.converged() && report.iterations == 2);
-/// assert!((x[0] - 4.0).abs() < 1e-15 && (x[1] - 3.0).abs() < 1e-15, "{x:?}");
-/// # Ok::<(), bfree::solver::LinearError>(())
-/// ```
-///
-/// # Errors
-/// A setting is out of range, the lengths differ, or a number is NaN or infinite.
-pub fn gmres(
-    operator: &dyn LinearOperator,
-    preconditioner: &dyn LinearOperator,
-    rhs: &[f64],
-    solution: &mut [f64],
-    settings: &GmresSettings,
-    workspace: &Pool,
-) -> Result<LinearReport, LinearError> {
-    settings.solve(workspace, operator, preconditioner, rhs, solution)
-}
-
 impl GmresSettings {
-    /// [`gmres`] where the vectors lie.
+    /// Solves A x = b from x = 0 by GMRES(m) on A M⁻¹. Its residual is the true residual.
+    ///
+    /// 1. r = b − A x, v₁ = r/‖r‖.
+    /// 2. w = A M⁻¹ vⱼ is made orthogonal to v₁ … vⱼ by modified Gram–Schmidt, twice if much cancels. This gives column j of H, and vⱼ₊₁.
+    /// 3. Givens rotations keep H triangular and give the residual norm without x.
+    /// 4. After m iterations, or at the tolerance, or when the space is exhausted: x ← x + M⁻¹ V y with H y = ‖r‖ e₁.
+    /// 5. The residual is computed anew from x. If it does not meet the tolerance, the method goes back to 1.
+    /// 6. If the best solution in the space of a whole cycle is hardly better than x, m is doubled. Null modes and clustered small eigenvalues
+    ///    need longer cycles, and a failed solve costs more than a few vectors.
+    /// 7. Otherwise a cycle that hardly lowers the true residual has met round-off or an exhausted space. It ends the iteration as
+    ///    [`LinearOutcome::Stagnated`]. A cycle that raises the true residual is undone.
+    ///
+    /// `solution` is overwritten, and its former contents do not matter. b = 0 gives x = 0 without iterating.
+    ///
+    /// ```
+    /// use bfree::pooled::Pool;
+    /// use bfree::solver::{GmresSettings, Identity, System};
+    ///
+    /// // A quarter turn and a stretch: not symmetric, so conjugate gradients would not do.
+    /// let turn = |x: &[f64], y: &mut [f64]| (y[0], y[1]) = (-2.0 * x[1], 2.0 * x[0]);
+    /// let system = System { vectors: &Pool::default(), operator: &turn, inverse: &Identity };
+    /// let mut x = [0.0; 2];
+    /// let settings = GmresSettings { relative_tolerance: 1e-8, max_iterations: 10, restart: 30 };
+    /// let report = settings.solve(&system, &[-6.0, 8.0], &mut x)?;
+    /// // Without rounding, a matrix of order n takes n iterations.
+    /// assert!(report.converged() && report.iterations == 2);
+    /// assert!((x[0] - 4.0).abs() < 1e-15 && (x[1] - 3.0).abs() < 1e-15, "{x:?}");
+    /// # Ok::<(), bfree::solver::LinearError>(())
+    /// ```
     ///
     /// # Errors
-    /// See [`gmres`].
+    /// A setting is out of range, the lengths differ, or a number is NaN or infinite.
     pub fn solve<S: Vectors>(
         &self,
-        vectors: &S,
-        operator: &dyn LinearOperator<S::Vector>,
-        preconditioner: &dyn LinearOperator<S::Vector>,
+        system: &System<'_, S>,
         rhs: &S::Vector,
         solution: &mut S::Vector,
     ) -> Result<LinearReport, LinearError> {
         InvalidSetting::check(self.restart >= 1, "restart", self.restart as f64, "at least 1")?;
+        let vectors = system.vectors;
         let (mut report, b_norm) = begin(vectors, rhs, solution, self.relative_tolerance)?;
         if b_norm == 0.0 {
             return Ok(report);
@@ -106,7 +83,6 @@ impl GmresSettings {
         let mut r = vectors.copied(rhs);
         let mut r_norm = b_norm;
         let (mut trial, mut correction) = (vectors.zeros(n), vectors.zeros(n));
-        let step = Cycle { vectors, operator, preconditioner, target };
         loop {
             report.relative_residual = r_norm / b_norm;
             if report.iterations >= self.max_iterations {
@@ -114,7 +90,7 @@ impl GmresSettings {
                 return Ok(report);
             }
             let length = restart.min(self.max_iterations - report.iterations);
-            let (taken, promised) = step.run(&r, r_norm, length, &mut correction).map_err(|at| {
+            let (taken, promised) = cycle(system, target, (&r, r_norm), length, &mut correction).map_err(|at| {
                 LinearError::NotFinite { what: "the norm of a Krylov vector", iteration: report.iterations + at }
             })?;
             report.iterations += taken;
@@ -122,14 +98,14 @@ impl GmresSettings {
             vectors.copy(solution, &mut trial);
             mutant!("solver: a restart of GMRES forgets the solution so far": { vectors.clear(&mut trial); });
             vectors.axpy(1.0, &correction, &mut trial);
-            let trial_norm = true_residual(vectors, operator, rhs, &trial, &mut r, &mut report)?;
+            let trial_norm = system.true_residual(rhs, &trial, &mut r, &mut report)?;
             let (before, fell) = (r_norm, trial_norm / r_norm);
             if fell < 1.0 {
                 vectors.copy(&trial, solution);
                 r_norm = trial_norm;
                 report.relative_residual = r_norm / b_norm;
             } else {
-                true_residual(vectors, operator, rhs, solution, &mut r, &mut report)?;
+                system.true_residual(rhs, solution, &mut r, &mut report)?;
             }
             if r_norm <= target {
                 return Ok(report);
@@ -145,60 +121,49 @@ impl GmresSettings {
     }
 }
 
-/// A system, and the norm of the residual at which a cycle ends.
-struct Cycle<'a, S: Vectors> {
-    vectors: &'a S,
-    operator: &'a dyn LinearOperator<S::Vector>,
-    preconditioner: &'a dyn LinearOperator<S::Vector>,
+/// One cycle of at most `length` iterations on the residual `r` of norm `r_norm`. It ends when the norm is `target`. Writes the correction of x.
+/// Returns the number of iterations and the residual norm that the rotations predict.
+///
+/// # Errors
+/// The iteration at which a Krylov vector is not finite.
+fn cycle<S: Vectors>(
+    &System { vectors, operator, inverse }: &System<'_, S>,
     target: f64,
-}
-
-impl<S: Vectors> Cycle<'_, S> {
-    /// One cycle of at most `length` iterations on the residual `r` of norm `r_norm`. Writes the correction of x. Returns the number of
-    /// iterations and the residual norm that the rotations predict.
-    ///
-    /// # Errors
-    /// The iteration at which a Krylov vector is not finite.
-    fn run(
-        &self,
-        r: &S::Vector,
-        r_norm: f64,
-        length: usize,
-        correction: &mut S::Vector,
-    ) -> Result<(usize, f64), usize> {
-        let &Self { vectors, operator, preconditioner, target } = self;
-        let fresh = || vectors.zeros(vectors.len(r));
-        let mut v = fresh();
-        vectors.scaled(1.0 / r_norm, r, &mut v);
-        // The basis grows by one vector an iteration, so a cycle that ends early allocates no more than it needs.
-        let mut basis: Vec<S::Owned> = Vec::new();
-        let mut triangle = Triangle { last: r_norm, ..Triangle::default() };
-        for iteration in 0..length {
-            let mut w = fresh();
-            // `correction` holds M⁻¹ v meanwhile.
-            preconditioner.apply(&v, correction);
-            operator.apply(correction, &mut w);
-            basis.push(v);
-            let w_norm = vectors.norm(&w);
-            if !w_norm.is_finite() {
-                return Err(iteration);
-            }
-            let (column, left) = orthogonalise(vectors, &mut w, w_norm, &basis);
-            let exhausted = left <= EXHAUSTED * w_norm;
-            triangle.push(column, if exhausted { 0.0 } else { left });
-            if exhausted || triangle.residual() <= target {
-                break;
-            }
-            v = fresh();
-            vectors.scaled(1.0 / left, &w, &mut v);
+    (r, r_norm): (&S::Vector, f64),
+    length: usize,
+    correction: &mut S::Vector,
+) -> Result<(usize, f64), usize> {
+    let fresh = || vectors.zeros(vectors.len(r));
+    let mut v = fresh();
+    vectors.scaled(1.0 / r_norm, r, &mut v);
+    // The basis grows by one vector an iteration, so a cycle that ends early allocates no more than it needs.
+    let mut basis: Vec<S::Owned> = Vec::new();
+    let mut triangle = Triangle { last: r_norm, ..Triangle::default() };
+    for iteration in 0..length {
+        let mut w = fresh();
+        // `correction` holds M⁻¹ v meanwhile.
+        inverse.apply(&v, correction);
+        operator.apply(correction, &mut w);
+        basis.push(v);
+        let w_norm = vectors.norm(&w);
+        if !w_norm.is_finite() {
+            return Err(iteration);
         }
-        let mut sum = fresh();
-        for (y, v) in triangle.solve().iter().zip(&basis) {
-            vectors.axpy(*y, v, &mut sum);
+        let (column, left) = orthogonalise(vectors, &mut w, w_norm, &basis);
+        let exhausted = left <= EXHAUSTED * w_norm;
+        triangle.push(column, if exhausted { 0.0 } else { left });
+        if exhausted || triangle.residual() <= target {
+            break;
         }
-        preconditioner.apply(&sum, correction);
-        Ok((basis.len(), triangle.residual()))
+        v = fresh();
+        vectors.scaled(1.0 / left, &w, &mut v);
     }
+    let mut sum = fresh();
+    for (y, v) in triangle.solve().iter().zip(&basis) {
+        vectors.axpy(*y, v, &mut sum);
+    }
+    inverse.apply(&sum, correction);
+    Ok((basis.len(), triangle.residual()))
 }
 
 /// Removes from `w` its components along the orthonormal `basis`. Returns these components and the norm of the remainder.

@@ -1,8 +1,8 @@
 use super::super::testing::{Dense, distance, irregular};
-use super::super::{Identity, LinearOutcome};
+use super::super::{Identity, LinearOperator};
 use super::*;
-use crate::pooled::Pooled;
-use crate::space::vector::{axpy, dot, norm};
+use crate::pooled::{Pool, Pooled};
+use crate::space::vector::{dot, norm};
 use std::cell::Cell;
 
 /// Solves with a memory pool of its own.
@@ -13,7 +13,7 @@ fn gmres(
     solution: &mut [f64],
     settings: &GmresSettings,
 ) -> Result<LinearReport, LinearError> {
-    super::gmres(operator, preconditioner, rhs, solution, settings, &Pool::default())
+    settings.solve(&System { vectors: &Pool::default(), operator, inverse: preconditioner }, rhs, solution)
 }
 
 const TIGHT: GmresSettings = GmresSettings { relative_tolerance: 1e-12, max_iterations: 500, restart: 100 };
@@ -113,7 +113,7 @@ fn restart_is_a_new_start_from_the_last_residual() {
     gmres(&a, &a.jacobi(), &b, &mut x, &once).unwrap();
     let r: Vec<f64> = b.iter().zip(a.times(&x)).map(|(b, ax)| b - ax).collect();
     gmres(&a, &a.jacobi(), &r, &mut dx, &once).unwrap();
-    axpy(1.0, &dx, &mut x);
+    Pool::default().axpy(1.0, &dx, &mut x);
     assert!(distance(&x, &twice) < 1e-15, "{}", distance(&x, &twice));
     // Any restart gives the same solution.
     let mut full = vec![0.0; 40];

@@ -13,9 +13,9 @@ pub use settings::{Krylov, NewtonSettings};
 use super::conjugate_gradient::ConjugateGradientSettings;
 use super::forcing::LOOSEST;
 use super::gmres::GmresSettings;
-use super::{LinearOperator, LinearOutcome, LinearReport, Linearization, NonlinearProblem, Preconditioner};
+use super::{LinearOutcome, LinearReport, Linearization, NonlinearProblem, Preconditioner, System};
 use crate::pooled::{Pool, Pooled};
-use crate::space::vector::{Vectors, dot, norm, xpby};
+use crate::space::vector::{Vectors, dot, norm};
 use settings::DEFAULT_RESTART;
 
 /// The part of the predicted decrease that a step must achieve (Armijo).
@@ -82,13 +82,6 @@ pub fn newton<E: std::error::Error + 'static>(
         Ok(convergence) => Ok(NewtonReport { convergence, history: newton.history }),
         Err(cause) => Err(NewtonError { cause, history: Box::new(newton.history) }),
     }
-}
-
-/// A linear system with an approximate inverse, and the place of its vectors.
-struct System<'a, S: Vectors> {
-    vectors: &'a S,
-    tangent: &'a dyn LinearOperator<S::Vector>,
-    inverse: &'a dyn LinearOperator<S::Vector>,
 }
 
 struct Newton<'a, E> {
@@ -204,14 +197,14 @@ impl<E: std::error::Error + 'static> Newton<'_, E> {
         let krylov = match tangent.on_device() {
             None => {
                 let inverse = &*preconditioner.prepare(tangent);
-                self.solve_in(&System { vectors: &pool, tangent, inverse }, &rhs, &mut d, relative_tolerance)?
+                self.solve_in(&System { vectors: &pool, operator: tangent, inverse }, &rhs, &mut d, relative_tolerance)?
             }
             Some(system) => {
                 let vectors = &**system.gpu();
                 let inverse = preconditioner.prepare_on_device(tangent, &*system);
                 let inverse = &*inverse.ok_or(LinearSolverFailure::NotOnDevice)?;
                 let (rhs, mut on_device) = (vectors.vector(&rhs), vectors.zeros(rhs.len()));
-                let system = System { vectors, tangent: &*system, inverse };
+                let system = System { vectors, operator: &*system, inverse };
                 let krylov = self.solve_in(&system, &rhs, &mut on_device, relative_tolerance);
                 d.copy_from_slice(&vectors.numbers(&on_device));
                 // After a failure of the device, numbers are NaN.
@@ -226,7 +219,7 @@ impl<E: std::error::Error + 'static> Newton<'_, E> {
     /// Step 3 where the vectors lie.
     fn solve_in<S: Vectors>(
         &mut self,
-        &System { vectors, tangent, inverse }: &System<'_, S>,
+        system: &System<'_, S>,
         rhs: &S::Vector,
         d: &mut S::Vector,
         relative_tolerance: f64,
@@ -236,19 +229,19 @@ impl<E: std::error::Error + 'static> Newton<'_, E> {
             Krylov::Gmres { restart } => (restart, None),
             Krylov::Automatic | Krylov::ConjugateGradient => {
                 let settings = ConjugateGradientSettings { relative_tolerance, max_iterations };
-                let report = settings.solve(vectors, tangent, inverse, rhs, d)?;
+                let report = settings.solve(system, rhs, d)?;
                 self.history.counts.add(&report);
                 (DEFAULT_RESTART, Some(report))
             }
         };
         let negative = descended.is_some_and(|report| report.outcome == LinearOutcome::NegativeCurvature);
         // −R·d > 0: the potential falls along the truncated step.
-        let truncated = negative && vectors.dot(rhs, d) > 0.0 && self.problem.potential(self.x).is_some();
+        let truncated = negative && system.vectors.dot(rhs, d) > 0.0 && self.problem.potential(self.x).is_some();
         let krylov = match descended {
             Some(report) if !negative || truncated => report,
             _ => {
                 let settings = GmresSettings { relative_tolerance, max_iterations, restart: restart as usize };
-                let report = settings.solve(vectors, tangent, inverse, rhs, d)?;
+                let report = settings.solve(system, rhs, d)?;
                 self.history.counts.add(&report);
                 report
             }
@@ -271,7 +264,7 @@ impl<E: std::error::Error + 'static> Newton<'_, E> {
         for halvings in 0..=MAX_HALVINGS {
             length = 0.5_f64.powi(halvings);
             self.trial.copy_from_slice(d);
-            xpby(self.x, length, &mut self.trial);
+            self.r.pool().xpby(self.x, length, &mut self.trial);
             self.history.counts.residuals += 1;
             self.history.counts.line_search += usize::from(halvings > 0);
             if let Err(why) = self.problem.residual(&self.trial, &mut self.r_trial) {

@@ -1,7 +1,7 @@
 //! Block-Jacobi: the inverses of the blocks on the diagonal.
 
 use super::Preconditioner;
-use crate::gpu::{Buffer, Gpu, GpuVector};
+use crate::gpu::{Buffer, GpuVector};
 use crate::parallel;
 use crate::pooled::Pooled;
 use crate::solver::{LinearOperator, Linearization, OnDevice};
@@ -45,7 +45,7 @@ impl<const D: usize> BlockJacobi<D> {
 impl<const D: usize> Preconditioner for BlockJacobi<D> {
     fn prepare<'a>(&'a mut self, tangent: &'a dyn Linearization) -> Box<dyn LinearOperator + 'a> {
         self.take(tangent);
-        Box::new(&*self)
+        Box::new(|r: &[f64], z: &mut [f64]| self.apply(r, z))
     }
 
     fn prepare_on_device<'a>(
@@ -55,22 +55,8 @@ impl<const D: usize> Preconditioner for BlockJacobi<D> {
     ) -> Option<Box<dyn LinearOperator<GpuVector> + 'a>> {
         self.take(tangent);
         let (inverse, gpu) = (&self.inverse, system.gpu());
-        let inverse = self.on_device.get_or_insert_with(|| Arc::new(gpu.copy_of(inverse)));
-        Some(Box::new(DeviceBlocks { gpu, inverse, dimension: D }))
-    }
-}
-
-/// Diagonal blocks on a device.
-#[derive(Clone, Copy)]
-pub(super) struct DeviceBlocks<'a> {
-    pub gpu: &'a Gpu,
-    pub inverse: &'a Buffer<f64>,
-    pub dimension: usize,
-}
-
-impl LinearOperator<GpuVector> for DeviceBlocks<'_> {
-    fn apply(&self, r: &GpuVector, z: &mut GpuVector) {
-        self.gpu.multiply_blocks(self.inverse, self.dimension, r, z);
+        let inverse = &**self.on_device.get_or_insert_with(|| Arc::new(gpu.copy_of(inverse)));
+        Some(Box::new(|r: &GpuVector, z: &mut GpuVector| gpu.multiply_blocks(inverse, D, r, z)))
     }
 }
 

@@ -1,7 +1,8 @@
 //! Chebyshev polynomials over block-Jacobi, and the largest eigenvalue that they need.
 
+use crate::pooled::Pool;
 use crate::solver::LinearOperator;
-use crate::space::vector::{Vectors, axpy, dot, xpby};
+use crate::space::vector::{Vectors, dot};
 use nalgebra::DMatrix;
 
 /// A Chebyshev polynomial.
@@ -29,14 +30,15 @@ const MARGIN: f64 = 1.15;
 /// The largest eigenvalue of D⁻¹K, with a margin. Conjugate gradients with the preconditioner D have the coefficients of the Lanczos method
 /// (Saad, Iterative Methods for Sparse Linear Systems, 2nd ed., section 6.7.3). These coefficients are ratios: units of length, mass and
 /// time do not change their bits.
-pub(super) fn largest(operator: &dyn LinearOperator, jacobi: &dyn Fn(&[f64], &mut [f64]), n: usize) -> f64 {
+pub(super) fn largest(operator: &dyn LinearOperator, jacobi: &dyn LinearOperator, n: usize) -> f64 {
     let start: Vec<f64> = (1..=n).map(|i| 2.0 * (i as f64 * 0.618_033_988_749_894_9).fract() - 1.0).collect();
+    let vectors = Pool::default();
     let (mut r, mut z, mut w) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
     // A product clears the entries at prescribed unknowns. It comes first, because there D is 1 in any units.
     operator.apply(&start, &mut w);
-    jacobi(&w, &mut z);
+    jacobi.apply(&w, &mut z);
     operator.apply(&z, &mut r);
-    jacobi(&r, &mut z);
+    jacobi.apply(&r, &mut z);
     let mut p = z.clone();
     let mut r_z = dot(&r, &z);
     let mut matrix = DMatrix::<f64>::zeros(ESTIMATE, ESTIMATE);
@@ -48,8 +50,8 @@ pub(super) fn largest(operator: &dyn LinearOperator, jacobi: &dyn Fn(&[f64], &mu
             break;
         }
         matrix[(step, step)] = 1.0 / alpha + carried;
-        axpy(-alpha, &w, &mut r);
-        jacobi(&r, &mut z);
+        vectors.axpy(-alpha, &w, &mut r);
+        jacobi.apply(&r, &mut z);
         let r_z_next = dot(&r, &z);
         let beta = r_z_next / r_z;
         if beta.is_nan() || beta <= 0.0 {
@@ -58,7 +60,7 @@ pub(super) fn largest(operator: &dyn LinearOperator, jacobi: &dyn Fn(&[f64], &mu
         if step + 1 < ESTIMATE {
             (matrix[(step, step + 1)], matrix[(step + 1, step)]) = (beta.sqrt() / alpha, beta.sqrt() / alpha);
         }
-        xpby(&z, beta, &mut p);
+        vectors.xpby(&z, beta, &mut p);
         carried = beta / alpha;
         r_z = r_z_next;
     }
@@ -67,15 +69,12 @@ pub(super) fn largest(operator: &dyn LinearOperator, jacobi: &dyn Fn(&[f64], &mu
     if largest > 0.0 { largest } else { 1.0 }
 }
 
-/// A product with an approximate inverse, such as that of the diagonal blocks.
-pub(super) type Inverse<'a, V> = dyn Fn(&V, &mut V) + 'a;
-
 /// Smooths: x ← x + p(D⁻¹K) D⁻¹ (b − K x) with a Chebyshev polynomial p. `zero` tells that x = 0 at the start, which saves a product.
 pub(super) fn smooth<S: Vectors>(
     Chebyshev { degree, part, largest }: Chebyshev,
     vectors: &S,
     operator: &dyn LinearOperator<S::Vector>,
-    jacobi: &Inverse<'_, S::Vector>,
+    jacobi: &dyn LinearOperator<S::Vector>,
     b: &S::Vector,
     x: &mut S::Vector,
     zero: bool,
@@ -90,13 +89,13 @@ pub(super) fn smooth<S: Vectors>(
         operator.apply(x, &mut r);
         vectors.xpby(b, -1.0, &mut r);
     }
-    jacobi(&r, &mut z);
+    jacobi.apply(&r, &mut z);
     vectors.divided(&z, theta, &mut p);
     let mut rho = 1.0 / sigma;
     for _ in 1..degree {
         operator.apply(&p, &mut z);
         vectors.move_along(&p, &z, x, &mut r);
-        jacobi(&r, &mut z);
+        jacobi.apply(&r, &mut z);
         let next = 1.0 / (2.0 * sigma - rho);
         vectors.axpby(2.0 * next / delta, &z, next * rho, &mut p);
         rho = next;

@@ -7,13 +7,13 @@ mod multigrid;
 mod saddle;
 
 pub use block_jacobi::BlockJacobi;
-pub(crate) use multigrid::bytes as multigrid_bytes;
 pub use multigrid::{LocalForm, Multigrid};
-pub(crate) use saddle::bytes as saddle_bytes;
-pub use saddle::{PressureCells, Saddle};
+pub(crate) use multigrid::{bytes as multigrid_bytes, rigid_motions};
+pub use saddle::PressureCells;
+pub(crate) use saddle::{Saddle, bytes as saddle_bytes};
 
 use super::{LinearOperator, Linearization, OnDevice};
-use crate::gpu::{Gpu, GpuVector};
+use crate::gpu::GpuVector;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt::{Display, Formatter};
@@ -23,7 +23,7 @@ use std::fmt::{Display, Formatter};
 ///
 /// ```
 /// use bfree::pooled::{Pool, Pooled};
-/// use bfree::solver::{BlockJacobi, GmresSettings, LinearOperator, Linearization, Preconditioner, gmres};
+/// use bfree::solver::{BlockJacobi, GmresSettings, LinearOperator, Linearization, Preconditioner, System};
 ///
 /// /// A diagonal matrix.
 /// struct Diagonal(Vec<f64>);
@@ -43,8 +43,9 @@ use std::fmt::{Display, Formatter};
 /// // Blocks of one row are the whole matrix, so M⁻¹A = I takes one iteration, however different the entries are.
 /// let (matrix, mut inverse, mut x) = (Diagonal(vec![1.0, 1e3, 1e6]), BlockJacobi::<1>::default(), [0.0; 3]);
 /// let inverse = inverse.prepare(&matrix);
+/// let system = System { vectors: &Pool::default(), operator: &matrix, inverse: &*inverse };
 /// let settings = GmresSettings { relative_tolerance: 1e-8, max_iterations: 10, restart: 30 };
-/// let report = gmres(&matrix, &*inverse, &[1.0, 2e3, 3e6], &mut x, &settings, &Pool::default())?;
+/// let report = settings.solve(&system, &[1.0, 2e3, 3e6], &mut x)?;
 /// assert_eq!(report.iterations, 1);
 /// assert!(x.iter().zip([1.0, 2.0, 3.0]).all(|(x, exact)| (x - exact).abs() < 1e-15 * exact));
 /// # Ok::<(), bfree::solver::LinearError>(())
@@ -127,15 +128,6 @@ impl LinearOperator for Identity {
     }
 }
 
-/// The identity on a device.
-struct DeviceIdentity<'a>(&'a Gpu);
-
-impl LinearOperator<GpuVector> for DeviceIdentity<'_> {
-    fn apply(&self, r: &GpuVector, z: &mut GpuVector) {
-        self.0.copy(&r.0, &mut z.0);
-    }
-}
-
 impl Preconditioner for Identity {
     fn prepare<'a>(&'a mut self, _: &'a dyn Linearization) -> Box<dyn LinearOperator + 'a> {
         Box::new(Self)
@@ -146,6 +138,7 @@ impl Preconditioner for Identity {
         _: &'a dyn Linearization,
         system: &'a dyn OnDevice,
     ) -> Option<Box<dyn LinearOperator<GpuVector> + 'a>> {
-        Some(Box::new(DeviceIdentity(system.gpu())))
+        let gpu = system.gpu();
+        Some(Box::new(|r: &GpuVector, z: &mut GpuVector| gpu.copy(&r.0, &mut z.0)))
     }
 }

@@ -8,7 +8,7 @@ use crate::table::Table;
 use bfree::plan::Plan;
 use bfree::pooled::Pool;
 use bfree::simulation::Simulation;
-use bfree::solver::{ConjugateGradientSettings, LinearReport, Preconditioning, conjugate_gradient};
+use bfree::solver::{ConjugateGradientSettings, LinearReport, Preconditioning, System};
 
 /// The summary in the list of studies.
 pub(super) const ABOUT: &str = "one linear system by conjugate gradients with each preconditioner";
@@ -73,9 +73,10 @@ fn solve(simulation: &Simulation<3>, by: Preconditioning) -> Result<(LinearRepor
     let settings = ConjugateGradientSettings { relative_tolerance: SOLVE, max_iterations: 10_000 };
     let mut d = vec![0.0; right.len()];
     let (start, mut preconditioner) = (Thread::now(), by.build::<3>());
-    let tangent = equilibrium.tangent(&dphi)?;
+    let tangent = equilibrium.tangent(None, &dphi)?;
     let inverse = preconditioner.prepare(&tangent);
-    let report = conjugate_gradient(&tangent, &*inverse, right, &mut d, &settings, &pool)?;
+    let system = System { vectors: &pool, operator: &tangent, inverse: &*inverse };
+    let report = settings.solve(&system, right, &mut d)?;
     Ok((report, start.elapsed()))
 }
 

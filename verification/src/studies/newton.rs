@@ -9,7 +9,7 @@ use bfree::mechanics::residual::Equilibrium;
 use bfree::pooled::Pool;
 use bfree::simulation::{AdvanceError, Simulation};
 use bfree::solver::{
-    BlockJacobi, Forcing, GmresSettings, Krylov, NewtonHistory, NewtonSettings, NonlinearProblem, gmres, newton,
+    BlockJacobi, Forcing, GmresSettings, Krylov, NewtonHistory, NewtonSettings, NonlinearProblem, System, newton,
 };
 use bfree::tensor::Vector;
 
@@ -277,7 +277,8 @@ fn step(problem: &Equilibrium<'_, 2, Material>, mut x: Vec<f64>) -> Result<(f64,
         let settings = GmresSettings { relative_tolerance: 1e-13, restart: 200, max_iterations: 400 };
         let mut blocks = BlockJacobi::<2>::default();
         blocks.take(&*tangent);
-        gmres(&*tangent, &blocks, &rhs, &mut d, &settings, &Pool::default())?;
+        let system = System { vectors: &Pool::default(), operator: &*tangent, inverse: &blocks };
+        settings.solve(&system, &rhs, &mut d)?;
         x.iter_mut().zip(d).for_each(|(x, d)| *x += d);
     }
     NonlinearProblem::residual(problem, &x, &mut r)?;

@@ -231,7 +231,7 @@ fn patch_test<const D: usize>(name: &str, shape: &Approximation, report: &mut Re
         let (supports, nodes) = Supports::new(shape, &grid, &particles.position)?;
         let (at_rest, nodal) = (vec![Vector::zeros(); nodes.len()], Nodal::default());
         let (particles, bodies, supports, loads) = (&particles, &bodies, &supports, &Loads::default());
-        let (nodal, alphas, lumping, time, dt) = (&nodal, Statics.end(0.0), 1.0, 0.0, 0.0);
+        let (nodal, alphas, lumping, time, dt) = (&nodal, Statics::default().end(0.0), 1.0, 0.0, 0.0);
         let step = Step { particles, bodies, loads, supports, nodal, alphas, lumping, time, dt, poses: None };
         let equilibrium = Equilibrium::new(step, &[]);
         let force = equilibrium.residual::<f64>(&at_rest)?;

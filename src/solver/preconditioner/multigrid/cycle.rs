@@ -1,7 +1,7 @@
 //! The V-cycle, wherever its vectors lie.
 
 use crate::solver::LinearOperator;
-use crate::solver::preconditioner::chebyshev::{Chebyshev, Inverse, smooth};
+use crate::solver::preconditioner::chebyshev::{Chebyshev, smooth};
 use crate::space::vector::Vectors;
 
 /// A coarse level, whose `apply` is Eᵀ K E.
@@ -24,12 +24,12 @@ pub(super) struct Cycle<'a, S: Vectors> {
     pub vectors: &'a S,
     pub tangent: &'a dyn LinearOperator<S::Vector>,
     /// M of the finest smoother.
-    pub smoother: Box<Inverse<'a, S::Vector>>,
+    pub smoother: Box<dyn LinearOperator<S::Vector> + 'a>,
     /// The largest eigenvalue of M K.
     pub largest: f64,
     pub levels: Vec<&'a dyn Coarse<S>>,
     /// The solve of the last level.
-    pub bottom: Box<Inverse<'a, S::Vector>>,
+    pub bottom: Box<dyn LinearOperator<S::Vector> + 'a>,
 }
 
 impl<S: Vectors> Cycle<'_, S> {
@@ -37,7 +37,7 @@ impl<S: Vectors> Cycle<'_, S> {
     fn coarse(&self, from: usize, b: &S::Vector) -> S::Owned {
         let (level, mut x) = (self.levels[from], self.vectors.zeros(self.vectors.len(b)));
         if from + 1 == self.levels.len() {
-            (self.bottom)(b, &mut x);
+            self.bottom.apply(b, &mut x);
             return x;
         }
         let jacobi = |r: &S::Vector, z: &mut S::Vector| level.precondition(r, z);

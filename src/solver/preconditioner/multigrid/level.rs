@@ -136,7 +136,7 @@ impl<const D: usize> Level<D> {
         level.hold();
         next.prescribed.clone_from(&level.held);
         level.invert_blocks(&next);
-        level.largest = largest(&level, &|r, z| level.precondition(r, z), D * next.nodes.len());
+        level.largest = largest(&level, &|r: &[f64], z: &mut [f64]| level.precondition(r, z), D * next.nodes.len());
         (level, next)
     }
 

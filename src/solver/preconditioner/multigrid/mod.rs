@@ -17,6 +17,7 @@ mod on_device;
 mod rigid;
 
 pub use form::LocalForm;
+pub(crate) use rigid::rigid_motions;
 
 use super::chebyshev::largest;
 use super::{BlockJacobi, Preconditioner};
@@ -65,7 +66,7 @@ impl<const D: usize> Multigrid<D> {
     fn build(&mut self, form: Option<LocalForm>, fine: &dyn LinearOperator) {
         let cubic = form.as_ref().filter(|form| form.degree == 3);
         self.filter = cubic.map(|form| Filter::new::<D>(form, self.blocks.inverses()));
-        self.largest = largest(fine, &|r, z| self.filtered(r, z), self.blocks.len());
+        self.largest = largest(fine, &|r: &[f64], z: &mut [f64]| self.filtered(r, z), self.blocks.len());
         let Some(mut form) = form else { return };
         loop {
             let (level, next) = Level::<D>::of(&form);
@@ -117,10 +118,10 @@ impl<const D: usize> Preconditioner for Multigrid<D> {
         Box::new(Cycle {
             vectors: &this.pool,
             tangent,
-            smoother: Box::new(|r, z| this.filtered(r, z)),
+            smoother: Box::new(|r: &[f64], z: &mut [f64]| this.filtered(r, z)),
             largest: this.largest,
             levels: this.levels.iter().map(|level| level as &dyn Coarse<Pool>).collect(),
-            bottom: Box::new(|b, x| this.solve_bottom(b, x)),
+            bottom: Box::new(|b: &[f64], x: &mut [f64]| this.solve_bottom(b, x)),
         })
     }
 
@@ -138,10 +139,10 @@ impl<const D: usize> Preconditioner for Multigrid<D> {
         Some(Box::new(Cycle {
             vectors,
             tangent: system,
-            smoother: Box::new(|r, z| levels.smooth(vectors, r, z)),
+            smoother: Box::new(|r: &GpuVector, z: &mut GpuVector| levels.smooth(vectors, r, z)),
             largest: this.largest,
             levels: levels.coarse(),
-            bottom: Box::new(|b, x| {
+            bottom: Box::new(|b: &GpuVector, x: &mut GpuVector| {
                 let mut solved = vec![0.0; vectors.len(b)];
                 this.solve_bottom(&vectors.numbers(b), &mut solved);
                 vectors.write_at(&solved, &mut x.0, 0);

@@ -1,5 +1,6 @@
 //! Rigid motions of the last level. A body that nothing holds has a singular matrix, and round-off would move the body by any distance.
 
+use crate::tensor::Vector;
 use nalgebra::{DMatrix, DVector};
 
 /// A motion with less energy than this, relative to that of its nodes one by one, is a rigid motion that nothing holds.
@@ -8,32 +9,32 @@ const NOTHING: f64 = 1e-12;
 /// A motion that differs from earlier ones by less than this part of it is none of its own.
 const DEPENDENT: f64 = 1e-6;
 
+/// The rigid motions at the end of an arm: translations along the axes, then rotations about the beginning of the arm.
+pub(crate) fn rigid_motions<const D: usize>(arm: &Vector<f64, D>) -> Vec<Vector<f64, D>> {
+    let axes = (0..D).map(|k| Vector::from_fn(|i, _| f64::from(i == k)));
+    let planes = (0..D).flat_map(|i| (i + 1..D).map(move |k| (i, k)));
+    let turns = planes.map(|(i, k)| {
+        let mut turn = Vector::zeros();
+        (turn[i], turn[k]) = (-arm[k], arm[i]);
+        turn
+    });
+    axes.chain(turns).collect()
+}
+
 /// Gives rigid motions that nothing holds a stiffness, and changes no other motion. `fixed` are the values that are no unknowns.
 pub(super) fn hold<const D: usize>(matrix: &mut DMatrix<f64>, nodes: &[[u32; 3]], fixed: &[bool]) {
     mutant!("multigrid: motions that nothing holds have no stiffness": { return; });
     let weight = matrix.diagonal();
     let within = |a: &DVector<f64>, b: &DVector<f64>| a.component_mul(&weight).dot(b);
-    let middle: [f64; D] =
-        std::array::from_fn(|k| nodes.iter().map(|at| f64::from(at[k])).sum::<f64>() / nodes.len() as f64);
-    let arm = |node: usize, k: usize| f64::from(nodes[node][k]) - middle[k];
-    let field = |of: &dyn Fn(usize, usize) -> f64| {
-        DVector::from_fn(matrix.nrows(), |i, _| if fixed[i] { 0.0 } else { of(i / D, i % D) })
-    };
-    let translations = (0..D).map(|axis| field(&|_, i| if i == axis { 1.0 } else { 0.0 }));
-    let planes = (0..D).flat_map(|a| (a + 1..D).map(move |b| (a, b)));
-    let turn = |(a, b): (usize, usize)| {
-        field(&|node, i| {
-            if i == a {
-                -arm(node, b)
-            } else if i == b {
-                arm(node, a)
-            } else {
-                0.0
-            }
-        })
+    let sum = |k: usize| nodes.iter().map(|at| f64::from(at[k])).sum::<f64>();
+    let middle = Vector::<f64, D>::from_fn(|k, _| sum(k) / nodes.len() as f64);
+    let at_node = |at: &[u32; 3]| rigid_motions(&Vector::<f64, D>::from_fn(|k, _| f64::from(at[k]) - middle[k]));
+    let at_nodes: Vec<_> = nodes.iter().map(at_node).collect();
+    let field = |number: usize| {
+        DVector::from_fn(matrix.nrows(), |i, _| if fixed[i] { 0.0 } else { at_nodes[i / D][number][i % D] })
     };
     let mut motions: Vec<DVector<f64>> = Vec::new();
-    for mut motion in translations.chain(planes.map(turn)) {
+    for mut motion in (0..D * (D + 1) / 2).map(field) {
         let before = within(&motion, &motion).sqrt();
         for other in &motions {
             motion -= other * within(other, &motion);

@@ -172,7 +172,7 @@ impl<const D: usize> Schur<D> {
     /// A part with C′ in its diagonal, and its largest eigenvalue.
     fn finished(&self, mut part: Coupled<D>) -> Coupled<D> {
         part.diagonal.iter_mut().zip(&self.compliance).for_each(|(d, c)| *d += c);
-        part.largest = largest(&Sum(self, &part), &|r, z| part.scale(r, z), part.diagonal.len());
+        part.largest = largest(&Sum(self, &part), &|r: &[f64], z: &mut [f64]| part.scale(r, z), part.diagonal.len());
         part
     }
 
@@ -202,7 +202,15 @@ impl<const D: usize> Schur<D> {
     pub(super) fn solve(&self, v: &[f64], q: &mut [f64]) {
         let inverted = |part: &Coupled<D>| {
             let (mut q, polynomial) = (vec![0.0; v.len()], Chebyshev { largest: part.largest, ..self.polynomial });
-            smooth(polynomial, &self.pool, &Sum(self, part), &|r, z| part.scale(r, z), v, &mut q, true);
+            smooth(
+                polynomial,
+                &self.pool,
+                &Sum(self, part),
+                &|r: &[f64], z: &mut [f64]| part.scale(r, z),
+                v,
+                &mut q,
+                true,
+            );
             q
         };
         q.iter_mut().zip(v).zip(&self.alone).for_each(|((q, v), alone)| *q = v / alone);

@@ -8,7 +8,7 @@ use crate::table::Table;
 use bfree::approximation::{Approximation, Bspline, Linear, Lme};
 use bfree::pooled::Pool;
 use bfree::simulation::Simulation;
-use bfree::solver::{BlockJacobi, GmresSettings, NonlinearProblem, gmres};
+use bfree::solver::{BlockJacobi, GmresSettings, NonlinearProblem, System};
 use bfree::tensor::{Tensor, Vector};
 
 /// The tolerance of the linear systems.
@@ -72,12 +72,13 @@ fn solve(shape: &Approximation, lumping: f64, overlap: f64) -> Result<f64, Study
     let dphi = vec![0.0; 2 * coming.nodes().len()];
     let mut right = dphi.clone();
     NonlinearProblem::residual(&equilibrium, &dphi, &mut right)?;
-    let tangent = equilibrium.tangent(bytemuck::cast_slice(&dphi))?;
+    let tangent = equilibrium.tangent(None, bytemuck::cast_slice(&dphi))?;
     let mut blocks = BlockJacobi::<2>::default();
     blocks.take(&tangent);
     let settings = GmresSettings { relative_tolerance: TOLERANCE, max_iterations: 10_000, restart: 200 };
     let mut solution = dphi.clone();
-    let report = gmres(&tangent, &blocks, &right, &mut solution, &settings, &Pool::default())?;
+    let system = System { vectors: &Pool::default(), operator: &tangent, inverse: &blocks };
+    let report = settings.solve(&system, &right, &mut solution)?;
     // If the tolerance is not met, the number of iterations is undefined.
     Ok(if report.converged() { report.iterations as f64 } else { f64::NAN })
 }

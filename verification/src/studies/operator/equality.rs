@@ -66,7 +66,7 @@ fn compare<const D: usize, L: Law>(
         let nodal = Nodal::project(&simulation.particles, supports, 0.5)?;
         let alphas = simulation.settings.scheme.end(simulation.clock.step());
         let equilibrium = simulation.equilibrium(supports, &nodal, &prescribed, alphas, 0.1);
-        let tangent = equilibrium.tangent(&dphi)?;
+        let tangent = equilibrium.tangent(None, &dphi)?;
         let mut product = vec![Vector::zeros(); count];
         tangent.product(&u, &mut product);
         let flat = |field: &[Vector<f64, D>]| bytemuck::cast_slice(field).to_vec();

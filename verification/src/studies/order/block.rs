@@ -92,7 +92,7 @@ fn loaded<const D: usize>(
     grid_reset: GridReset,
 ) -> Result<Held<Block, D>, StudyError> {
     let grid = Grid { origin: Vector::zeros(), spacing: f64::from(cells).recip(), cells: [cells; D] };
-    let settings = Settings { scheme: Arc::new(Statics), grid_reset, ..Settings::default() };
+    let settings = Settings { scheme: Arc::new(Statics::default()), grid_reset, ..Settings::default() };
     Held::new(block, grid, (&case.shape, case.layout), None, f64::from(steps).recip(), settings)?.after(steps)
 }
 

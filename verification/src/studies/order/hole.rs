@@ -40,7 +40,7 @@ pub(super) fn run(effort: Effort, outcome: &mut Outcome) {
         let refined = Refined { report: &mut report, table: &mut table, least };
         refined.run(&[name, layout.name], &[8, 16, 32], |cells| {
             let grid = Grid { origin: Vector::zeros(), spacing: f64::from(cells).recip(), cells: [cells; 2] };
-            let (scheme, grid_reset) = (Arc::new(Statics), GridReset::Never);
+            let (scheme, grid_reset) = (Arc::new(Statics::default()), GridReset::Never);
             let settings = Settings { scheme, grid_reset, aggregation: true, ..Settings::default() };
             let held = Held::new(block, grid, (&shape, layout), Some(&hole), 1.0, settings)?.after(1)?;
             Ok(([held.displacement(), held.stress()], held.work))

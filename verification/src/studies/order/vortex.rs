@@ -111,7 +111,7 @@ fn in_time(outcome: &mut Outcome) -> Result<(), StudyError> {
         let (before, after) = (apart(&coarse, &middle), apart(&middle, &fine));
         for (k, what) in ["displacement", "velocity"].into_iter().enumerate() {
             let bound = Bound::Between(order - NEAR, order + NEAR);
-            report.push(&[what, &scheme.to_string()], (before[k] / after[k]).log2(), bound);
+            report.push(&[what, &scheme.name()], (before[k] / after[k]).log2(), bound);
         }
     }
     outcome.reports.push(report);

@@ -1,4 +1,4 @@
-//! The linearised tangents of the laws, as rows of numbers.
+//! Linearised tangents of particles, as rows of numbers.
 
 use crate::gpu::{self, Buffer, Gpu};
 use crate::lanes::LANES;
@@ -9,21 +9,22 @@ use std::sync::{Arc, OnceLock};
 
 /// δσ = 𝔸 : L at all particles, one particle per lane.
 #[derive(Clone, Debug)]
-pub(crate) struct StressRows {
+pub(crate) struct Rows {
     form: Form,
-    /// The first group of this process.
+    /// The first group that has rows.
     first: usize,
-    /// For each group of this process, the numbers of its tangents.
+    /// The rows of a group. Those of 𝔸 come first.
+    count: usize,
     rows: Arc<Pooled<[f64; LANES]>>,
     factor: f64,
     /// The copy on a device, which all clones share.
     copy: Arc<OnceLock<Arc<Buffer<f64>>>>,
 }
 
-impl StressRows {
-    /// Tangents that are stored in `form`, from the group `first` on.
-    pub(crate) fn new(form: Form, first: usize, rows: Pooled<[f64; LANES]>) -> Self {
-        Self { form, first, rows: Arc::new(rows), factor: 1.0, copy: Arc::default() }
+impl Rows {
+    /// Tangents that are stored in `form`, from the group `first` on. Each group has `count` rows.
+    pub(crate) fn new(form: Form, first: usize, count: usize, rows: Pooled<[f64; LANES]>) -> Self {
+        Self { form, first, count, rows: Arc::new(rows), factor: 1.0, copy: Arc::default() }
     }
 
     pub(crate) fn times(self, factor: f64) -> Self {
@@ -31,20 +32,21 @@ impl StressRows {
     }
 
     /// A copy on a device.
-    pub(crate) fn on_device(&self, gpu: &Gpu, dimension: usize) -> gpu::Rows {
+    pub(crate) fn on_device(&self, gpu: &Gpu) -> gpu::Rows {
         let rows = self.copy.get_or_init(|| Arc::new(gpu.copy_of(self.rows.as_flattened()))).clone();
-        gpu::Rows { rows, factor: self.factor, form: self.form as i32, count: self.form.rows(dimension), cells: None }
+        gpu::Rows { rows, factor: self.factor, form: self.form as i32, count: self.count, cells: None }
     }
 
+    /// The rows of a group.
     #[inline(always)]
-    fn of_group(&self, group: usize, dimension: usize) -> &[[f64; LANES]] {
-        let (count, group) = (self.form.rows(dimension), group - self.first);
-        &self.rows[group * count..(group + 1) * count]
+    pub(super) fn of_group(&self, group: usize) -> &[[f64; LANES]] {
+        &self.rows[(group - self.first) * self.count..][..self.count]
     }
 
     #[inline(always)]
     pub(crate) fn add_product<const D: usize>(&self, group: Group<'_>, at: &At<f64, D, D>, sums: &mut At<f64, D, D>) {
-        let (form, rows, l) = (self.form, self.of_group(group.number, D), at.gradient.as_flattened());
+        let (form, l) = (self.form, at.gradient.as_flattened());
+        let rows = &self.of_group(group.number)[..form.rows(D)];
         if self.factor == 1.0 {
             return product(D, Product { form, rows, l, out: sums.gradient.as_flattened_mut() });
         }
@@ -56,7 +58,7 @@ impl StressRows {
     }
 
     pub(crate) fn add_quadratic(&self, dimension: usize, group: Group<'_>, into: &mut Quadratic) {
-        let rows = self.of_group(group.number, dimension);
+        let rows = &self.of_group(group.number)[..self.form.rows(dimension)];
         add_quadratic(dimension, AddTo { form: self.form, rows, factor: self.factor, into });
     }
 }
