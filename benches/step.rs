@@ -3,7 +3,7 @@
 //! One thread; a jittered, strained block with 2^D particles per cell.
 
 use bfree::mechanics::residual::Equilibrium;
-use bfree::mechanics::sweep::Supports;
+use bfree::mechanics::sweep::Connectivity;
 use bfree::mechanics::transfer::Nodal;
 use bfree::simulation::Simulation;
 use bfree::tensor::Vector;
@@ -56,10 +56,10 @@ fn at_a_step<const D: usize>(
 ) {
     let simulation = block::<D>(shape, cells);
     let (positions, dt) = (&simulation.particles.position, simulation.clock.step());
-    let (supports, nodes) =
-        Supports::new(&simulation.approximation, &simulation.grid, positions).expect("inside the grid");
-    let nodal = Nodal::project(&simulation.particles, &supports, 1.0).expect("finite velocities");
-    let equilibrium = simulation.equilibrium(&supports, &nodal, &[], simulation.settings.scheme.end(dt), dt);
+    let (connectivity, nodes) =
+        Connectivity::new(&simulation.approximation, &simulation.grid, positions).expect("inside the grid");
+    let nodal = Nodal::project(&simulation.particles, &connectivity, 1.0).expect("finite velocities");
+    let equilibrium = simulation.equilibrium(&connectivity, &nodal, &[], simulation.settings.scheme.end(dt), dt);
     let u: Vec<Vector<f64, D>> =
         nodes.positions(&simulation.grid).map(|(_, x)| x.map(|x| 0.01 * (0.7 * x).sin())).collect();
     work(bencher, &equilibrium, &u);
@@ -114,7 +114,7 @@ macro_rules! in_dimension {
             fn shape_functions(bencher: Bencher<'_, '_>, shape: &str) {
                 let simulation = block::<$dimension>(shape, $cells);
                 bencher.counter(ItemsCount::new(PARTICLES)).bench_local(|| {
-                    Supports::new(
+                    Connectivity::new(
                         &simulation.approximation,
                         &simulation.grid,
                         black_box(&simulation.particles.position),

@@ -14,7 +14,7 @@ use crate::mechanics::dilatation::Cells;
 use crate::mechanics::loads::PrescribedDof;
 use crate::mechanics::loads::{Motion, Pressing, SurfaceLoad, SurfacePoint};
 use crate::mechanics::reference::GridReset;
-use crate::mechanics::sweep::{SupportError, Supports};
+use crate::mechanics::sweep::{Connectivity, ConnectivityError};
 use crate::mechanics::terms::{Reason, planned};
 use crate::particles::Body;
 use crate::simulation::{SharedNodes, Simulation};
@@ -151,12 +151,12 @@ impl Plan {
     /// A particle has no shape functions.
     pub fn of<const D: usize, L: Law, A: ShapeFunction>(
         simulation: &Simulation<D, L, A>,
-    ) -> Result<Self, SupportError> {
-        let supports = simulation.new_supports(None)?;
-        let nodes = supports.active();
+    ) -> Result<Self, ConnectivityError> {
+        let connectivity = simulation.new_connectivity(None)?;
+        let nodes = connectivity.active();
         let prescribed = simulation.prescribed(nodes);
-        let space = supports.space(prescribed.iter().map(PrescribedDof::place));
-        let cells = mixed_cells(simulation, &supports);
+        let space = connectivity.space(prescribed.iter().map(PrescribedDof::place));
+        let cells = mixed_cells(simulation, &connectivity);
         Ok(Self {
             dimension: D,
             particles: simulation.particles.solid_places().len(),
@@ -166,10 +166,10 @@ impl Plan {
             grid_reset: simulation.settings.grid_reset,
             krylov: simulation.krylov(),
             preconditioner: simulation.preconditioner(),
-            terms: terms(simulation, &supports, cells),
-            arrays: arrays(simulation, &supports, cells),
+            terms: terms(simulation, &connectivity, cells),
+            arrays: arrays(simulation, &connectivity, cells),
             surfaces: SurfaceUse::of(simulation),
-            shared_nodes: shared_nodes(simulation, &supports),
+            shared_nodes: shared_nodes(simulation, &connectivity),
         })
     }
 
@@ -200,15 +200,15 @@ impl Plan {
 }
 
 /// The number of averaged cells whose dilatations are unknowns of their own.
-fn mixed_cells<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, supports: &Supports<D>) -> usize {
-    let cells = || Cells::of(&simulation.particles, &simulation.bodies, supports);
+fn mixed_cells<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, connectivity: &Connectivity<D>) -> usize {
+    let cells = || Cells::of(&simulation.particles, &simulation.bodies, connectivity);
     if simulation.is_mixed() { cells().map_or(0, |cells| cells.scales.len()) } else { 0 }
 }
 
 /// Bodies that share nodes, and how far apart they are.
 fn shared_nodes<const D: usize, L: Law, A: ShapeFunction>(
     simulation: &Simulation<D, L, A>,
-    supports: &Supports<D>,
+    connectivity: &Connectivity<D>,
 ) -> Vec<String> {
     let said = |one: &SharedNodes| {
         let [a, b] = one.bodies.map(|body| &simulation.bodies[body as usize].name);
@@ -217,12 +217,12 @@ fn shared_nodes<const D: usize, L: Law, A: ShapeFunction>(
             "{a:?} and {b:?} share nodes at the start, at a gap of {gap} spacings: they move as one there, and will not separate"
         )
     };
-    simulation.shared_nodes(supports).iter().map(said).collect()
+    simulation.shared_nodes(connectivity).iter().map(said).collect()
 }
 
 fn terms<const D: usize, L: Law, A>(
     simulation: &Simulation<D, L, A>,
-    supports: &Supports<D>,
+    connectivity: &Connectivity<D>,
     cells: usize,
 ) -> Vec<Reason> {
     let loads = &simulation.loads;
@@ -231,8 +231,8 @@ fn terms<const D: usize, L: Law, A>(
     let smooths = scheme.has_inertia() && settings.smoothing.is_some();
     let moving = loads.prescribed.iter().flat_map(|one| &one.motion).flatten().any(|motion| *motion != Motion::Rest);
     let averages = simulation.bodies.iter().any(Body::averages);
-    let aggregated = supports.extension().map_or("only with aggregation".into(), |extension| {
-        format!("{} of {} active nodes follow well-supported ones", extension.len(), supports.nodes())
+    let aggregated = connectivity.extension().map_or("only with aggregation".into(), |extension| {
+        format!("{} of {} active nodes follow well-supported ones", extension.len(), connectivity.nodes())
     });
     let choice_of_laws = match simulation.bodies.len() {
         1 => "only with several bodies; the law of the only one is looked up once in a pass over the particles".into(),

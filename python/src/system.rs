@@ -58,7 +58,7 @@ impl<const D: usize> System for NextStep<D, BodyLaw, Approximation> {
         }
         // Those that follow others are no unknowns either.
         let equilibrium = self.equilibrium();
-        for &outer in equilibrium.step.supports.extension().iter().flat_map(|extension| extension.outer()) {
+        for &outer in equilibrium.step.connectivity.extension().iter().flat_map(|extension| extension.outer()) {
             free[outer as usize * D..(outer as usize + 1) * D].fill(false);
         }
         free

@@ -10,7 +10,7 @@
 //! fields are reproduced to O(δ).
 
 use crate::mechanics::mass::is_light;
-use crate::mechanics::sweep::Supports;
+use crate::mechanics::sweep::Connectivity;
 use crate::particles::Particles;
 use crate::pooled::Pooled;
 use crate::tensor::{Tensor, Vector, identity, inverse, scaled};
@@ -22,18 +22,18 @@ const FLAT: f64 = 1e-3;
 /// u_I of two particle fields. `mass` is the lumped mass of the active nodes. Light nodes get zero.
 pub(super) fn affine<const D: usize>(
     particles: &Particles<D>,
-    supports: &Supports<D>,
+    connectivity: &Connectivity<D>,
     mass: &[f64],
     fields: [&[Vector<f64, D>]; 2],
 ) -> [Pooled<Vector<f64, D>>; 2] {
-    let (grid, is_light) = (supports.grid(), is_light(particles));
+    let (grid, is_light) = (connectivity.grid(), is_light(particles));
     // Relative to the first particle, squares of positions keep more digits.
     let position = particles.reference().position;
     let origin = position.first().copied().unwrap_or_else(Vector::zeros);
     let x = |p: usize| position[p] - origin;
     let mean = |value: &(dyn Fn(usize) -> Vector<f64, D> + Sync)| {
-        let mut mean: Pooled<Vector<f64, D>> = supports.field();
-        supports.spread(&mut mean, |p| value(p) * particles.mass[p]);
+        let mut mean: Pooled<Vector<f64, D>> = connectivity.field();
+        connectivity.spread(&mut mean, |p| value(p) * particles.mass[p]);
         mean.iter_mut().zip(mass).for_each(|(mean, &m)| *mean = if is_light(m) { Vector::zeros() } else { *mean / m });
         mean
     };
@@ -51,8 +51,8 @@ pub(super) fn affine<const D: usize>(
             covariance(&|p| field[p]).iter().zip(&inverses).map(|(with, inverse)| with * inverse).collect();
         let mut gradient = vec![Tensor::<f64, D>::zeros(); particles.len()];
         for k in 0..D {
-            let column = supports.pool().collect(slopes.iter().map(|slope| slope.column(k).into_owned()));
-            let columns = supports.values(&column);
+            let column = connectivity.pool().collect(slopes.iter().map(|slope| slope.column(k).into_owned()));
+            let columns = connectivity.values(&column);
             gradient.iter_mut().zip(&*columns).for_each(|(gradient, column)| gradient.set_column(k, column));
         }
         // ⟨u − G x⟩ + ⟨G⟩ x_I
@@ -60,7 +60,7 @@ pub(super) fn affine<const D: usize>(
         for k in 0..D {
             let slope = mean(&|p| gradient[p].column(k).into_owned());
             mutant!("transfer: affine fits lack their slope": { continue; });
-            let places = supports.active().positions(grid).map(|(_, place)| place[k] - origin[k]);
+            let places = connectivity.active().positions(grid).map(|(_, place)| place[k] - origin[k]);
             fitted.iter_mut().zip(&slope).zip(places).for_each(|((fitted, slope), x)| *fitted += slope * x);
         }
         fitted

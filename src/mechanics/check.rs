@@ -184,9 +184,9 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
 
     /// Lets the laws of a few particles compare what they claim with differences.
     fn check_claims(&self, phi: &[Vector<f64, D>]) -> Result<(), CheckError> {
-        let (particles, supports) = (self.step.particles, self.step.supports);
+        let (particles, connectivity) = (self.step.particles, self.step.connectivity);
         for p in (0..particles.len()).step_by(particles.len().div_ceil(CLAIMS).max(1)) {
-            let h = Kinematics(particles).displacement_gradient(p, &supports.gradient_at(p, phi));
+            let h = Kinematics(particles).displacement_gradient(p, &connectivity.gradient_at(p, phi));
             let at = particles.state(p, self.step.dt).deformed(h);
             let law = &self.step.bodies[particles.body[p] as usize].law;
             let particle = particles.id[p] as usize;
@@ -203,14 +203,14 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
         let particles = self.step.particles;
         let bounds = self
             .step
-            .supports
+            .connectivity
             .interpolate(phi, |p, _, g| Ok(tangent_bound(&Kinematics(particles).state(p, &g, 0.0)?.f)))?;
         Ok(bounds.into_iter().fold(tangent_bound(&identity::<f64, D>()), f64::max))
     }
 
     /// The size of a piece's contributions to K u where they may cancel: for loads, the force times |u|/h.
     fn size_of(&self, piece: Piece, phi: &[Vector<f64, D>], u: &[Vector<f64, D>]) -> Result<f64, Inadmissible> {
-        let nodes = self.step.supports.of(0).map(|(_, _, grad_n)| grad_n.norm()).fold(0.0, f64::max);
+        let nodes = self.step.connectivity.of(0).map(|(_, _, grad_n)| grad_n.norm()).fold(0.0, f64::max);
         let is_load = piece.role == Role::Loads;
         Ok(if is_load { norm(&self.residual_of::<f64>(piece, phi)?) * norm(u) * nodes } else { 0.0 })
     }

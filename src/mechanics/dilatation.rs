@@ -8,7 +8,7 @@
 use crate::lanes::LANES;
 use crate::material::{Law, p_wave_modulus};
 use crate::mechanics::joined_cells::{Content, Key, joined_cells};
-use crate::mechanics::sweep::{Number, Supports};
+use crate::mechanics::sweep::{Connectivity, Number};
 use crate::mechanics::trial::Trial;
 use crate::particles::{Body, Particles};
 use crate::scalar::Real;
@@ -72,10 +72,10 @@ type Keyed = (Key, u32, Member);
 
 /// The particles of averaged cells, sorted by cell and id. With aggregation, no particle is in a cell that its body hardly fills,
 /// if there is a better filled cell next to it. Without aggregation, hardly filled cells have a motion of their own, and thus a pressure.
-fn keyed<const D: usize>(particles: &Particles<D>, averages: &[bool], supports: &Supports<D>) -> Vec<Keyed> {
-    let (grid, reference) = (supports.grid(), particles.reference());
+fn keyed<const D: usize>(particles: &Particles<D>, averages: &[bool], connectivity: &Connectivity<D>) -> Vec<Keyed> {
+    let (grid, reference) = (connectivity.grid(), particles.reference());
     let mut keyed: Vec<Keyed> = Vec::new();
-    supports.each_group(|group| {
+    connectivity.each_group(|group| {
         for (lane, &particle) in group.particles.iter().enumerate() {
             let (p, slot) = (particle as usize, (group.number * LANES + lane) as u32);
             let body = particles.body[p];
@@ -87,7 +87,7 @@ fn keyed<const D: usize>(particles: &Particles<D>, averages: &[bool], supports: 
     });
     keyed.sort_unstable_by_key(|&(key, id, _)| (key, id));
     mutant!("mean dilatation: hardly filled cells have a dilatation of their own": { return keyed; });
-    if supports.extension().is_none() {
+    if connectivity.extension().is_none() {
         return keyed;
     }
     let content = |&(key, _, member): &Keyed| {
@@ -114,14 +114,14 @@ impl Cells {
     pub(crate) fn of<const D: usize, L: Law>(
         particles: &Particles<D>,
         bodies: &[Body<L>],
-        supports: &Supports<D>,
+        connectivity: &Connectivity<D>,
     ) -> Option<Self> {
         let averages: Vec<bool> = bodies.iter().map(Body::averages).collect();
         if !averages.contains(&true) {
             return None;
         }
-        let (grid, reference) = (supports.grid(), particles.reference());
-        let keyed = keyed(particles, &averages, supports);
+        let (grid, reference) = (connectivity.grid(), particles.reference());
+        let keyed = keyed(particles, &averages, connectivity);
         let mut cells = Self {
             members: keyed.iter().map(|&(.., member)| member).collect(),
             starts: vec![0],
@@ -178,11 +178,11 @@ impl Cells {
     pub(crate) fn changes<T: Number, const D: usize>(
         &self,
         particles: &Particles<D>,
-        supports: &Supports<D>,
+        connectivity: &Connectivity<D>,
         motion: &[Vector<T, D>],
     ) -> Vec<T> {
         let reference = particles.reference();
-        let grown = supports.evaluate(motion, |p, _, g| Deformation::new(g).j * T::lit(reference.volume(p)));
+        let grown = connectivity.evaluate(motion, |p, _, g| Deformation::new(g).j * T::lit(reference.volume(p)));
         let mean = |(members, volume): (&[Member], f64)| {
             let sum = members.iter().fold(T::zero(), |sum, member| sum + grown[member.particle as usize]);
             let change = sum * T::lit(1.0 / volume);
@@ -197,11 +197,11 @@ impl Cells {
     pub(crate) fn changes_at<T: Number, const D: usize>(
         &self,
         particles: &Particles<D>,
-        supports: &Supports<D>,
+        connectivity: &Connectivity<D>,
         at: Trial<'_, T, D>,
     ) -> Vec<T> {
         if at.dilatation.is_empty() {
-            return self.changes(particles, supports, at.phi);
+            return self.changes(particles, connectivity, at.phi);
         }
         let own = at.dilatation.iter().zip(&self.scales);
         own.map(|(&unknown, scale)| unknown * T::lit(scale.dilatation)).collect()
@@ -235,11 +235,11 @@ pub(crate) fn total<T: Real>(change: T, before: f64) -> T {
 pub(crate) fn after<const D: usize, L: Law>(
     particles: &Particles<D>,
     bodies: &[Body<L>],
-    supports: &Supports<D>,
+    connectivity: &Connectivity<D>,
     at: Trial<'_, f64, D>,
 ) -> Vec<f64> {
-    let Some(cells) = Cells::of(particles, bodies, supports) else { return Vec::new() };
-    let (changes, reference) = (cells.changes_at(particles, supports, at), particles.reference());
+    let Some(cells) = Cells::of(particles, bodies, connectivity) else { return Vec::new() };
+    let (changes, reference) = (cells.changes_at(particles, connectivity, at), particles.reference());
     let seen = |p: usize, cell: usize| total(changes[cell], reference.dilatation(p));
     let of = |p: usize| cells.cell(p as u32).map_or(0.0, |cell| seen(p, cell));
     let mut all: Vec<f64> = (0..particles.len()).map(of).collect();
@@ -267,14 +267,14 @@ mod tests {
         }
         let law = NeoHookean::ciarlet(Lame::new(100.0, 1.0)?);
         let bodies = [Body { name: "bar".into(), law, density: 1.0, dilatation: Dilatation::MeanDilatation, field: 0 }];
-        let cells = |supports: &Supports<1>| {
-            let cells = Cells::of(&particles, &bodies, supports);
+        let cells = |connectivity: &Connectivity<1>| {
+            let cells = Cells::of(&particles, &bodies, connectivity);
             let counts = |cells: Cells| cells.iter().map(|(members, _)| members.len()).collect::<Vec<_>>();
             cells.map(counts)
         };
-        let (supports, _) = Supports::new(&Linear, &grid, &particles.position)?;
-        assert_eq!(cells(&supports), Some(vec![2, 1]));
-        assert_eq!(cells(&supports.with_extension(Extension::default())), Some(vec![3]));
+        let (connectivity, _) = Connectivity::new(&Linear, &grid, &particles.position)?;
+        assert_eq!(cells(&connectivity), Some(vec![2, 1]));
+        assert_eq!(cells(&connectivity.with_extension(Extension::default())), Some(vec![3]));
         Ok(())
     }
 }

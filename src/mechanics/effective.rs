@@ -1,6 +1,6 @@
 //! Effective shape functions of inner nodes: those of a node itself, plus the weighted ones of the outer nodes that follow it.
 
-use crate::mechanics::sweep::{Quadratic, Supports};
+use crate::mechanics::sweep::{Connectivity, Quadratic};
 use crate::pooled::Pooled;
 use crate::space::Space;
 use crate::tensor::{Tensor, Vector};
@@ -21,10 +21,10 @@ impl<const D: usize> Function<D> {
 
 impl<const D: usize> Space<D> {
     /// The effective shape functions at a particle, with their nodes.
-    pub(crate) fn functions(&self, supports: &Supports<D>, particle: usize) -> Vec<(usize, Function<D>)> {
+    pub(crate) fn functions(&self, connectivity: &Connectivity<D>, particle: usize) -> Vec<(usize, Function<D>)> {
         let mut all: Vec<_> =
-            supports.of(particle).map(|(node, n, grad_n)| (node, Function::of_all(n, grad_n))).collect();
-        for (node, n, grad_n) in supports.of(particle) {
+            connectivity.of(particle).map(|(node, n, grad_n)| (node, Function::of_all(n, grad_n))).collect();
+        for (node, n, grad_n) in connectivity.of(particle) {
             let Some((follows, leaders)) = self.followers().row(node) else { continue };
             let mut add = |node: usize, factor: f64, components: [bool; D]| {
                 let place = all.iter().position(|(one, _)| *one == node).unwrap_or_else(|| {
@@ -43,27 +43,27 @@ impl<const D: usize> Space<D> {
     }
 
     /// For each particle, whether an outer node supports it.
-    pub(crate) fn reached(&self, supports: &Supports<D>) -> Vec<bool> {
-        let mut outer: Pooled<Vector<f64, D>> = supports.field();
+    pub(crate) fn reached(&self, connectivity: &Connectivity<D>) -> Vec<bool> {
+        let mut outer: Pooled<Vector<f64, D>> = connectivity.field();
         self.followers().rows().for_each(|(node, ..)| outer[node].fill(1.0));
-        supports.evaluate(&outer, |_, n, grad_n| n.iter().chain(&grad_n).any(|x| *x != 0.0))
+        connectivity.evaluate(&outer, |_, n, grad_n| n.iter().chain(&grad_n).any(|x| *x != 0.0))
     }
 
     /// Adds corrections of the diagonal blocks of a quadratic form at one particle: effective shape functions replace N and ∇N.
     pub(crate) fn add_followers(
         &self,
-        supports: &Supports<D>,
+        connectivity: &Connectivity<D>,
         particle: usize,
         form: &Quadratic,
         lane: usize,
         added: &mut Vec<(usize, Tensor<f64, D>)>,
     ) {
-        for (node, function) in self.functions(supports, particle) {
+        for (node, function) in self.functions(connectivity, particle) {
             let rows: [Tensor<f64, D>; D] =
                 std::array::from_fn(|i| form.block(lane, function.value[i], &function.gradient[i]));
             added.push((node, Tensor::from_fn(|i, k| rows[i][(i, k)])));
         }
-        for (node, n, grad_n) in supports.of(particle) {
+        for (node, n, grad_n) in connectivity.of(particle) {
             added.push((node, -form.block(lane, n, &grad_n)));
         }
     }

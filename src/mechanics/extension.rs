@@ -2,7 +2,7 @@
 
 use crate::aggregation::{Extension, Occupied, Pieces};
 use crate::grid::indices;
-use crate::mechanics::sweep::Supports;
+use crate::mechanics::sweep::Connectivity;
 use crate::parallel::{self, PART};
 use crate::particles::Particles;
 use crate::tensor::identity;
@@ -13,8 +13,12 @@ const LONGEST: f64 = 2.0;
 
 /// The extension E of the bodies in a grid, from the volumes of the particles at the last grid reset. A particle fills the cells that its domain overlaps.
 /// The filled share of a cell thus changes gradually as particles move into the cell. A cell that holds no particle counts as empty.
-pub(crate) fn extension<const D: usize>(pieces: Pieces, particles: &Particles<D>, supports: &Supports<D>) -> Extension {
-    let parts = (0..supports.field_count()).map(|field| of_field(field, pieces, particles, supports));
+pub(crate) fn extension<const D: usize>(
+    pieces: Pieces,
+    particles: &Particles<D>,
+    connectivity: &Connectivity<D>,
+) -> Extension {
+    let parts = (0..connectivity.field_count()).map(|field| of_field(field, pieces, particles, connectivity));
     Extension::joined(pieces.degree, parts)
 }
 
@@ -23,10 +27,10 @@ fn of_field<const D: usize>(
     field: u32,
     pieces: Pieces,
     particles: &Particles<D>,
-    supports: &Supports<D>,
+    connectivity: &Connectivity<D>,
 ) -> (usize, Extension) {
-    let (grid, reference) = (supports.grid(), particles.reference());
-    let in_field = |p: usize| supports.field_of(particles.body[p]) == field;
+    let (grid, reference) = (connectivity.grid(), particles.reference());
+    let in_field = |p: usize| connectivity.field_of(particles.body[p]) == field;
     let local = |p: usize, k: usize| grid.axis(k).local(reference.position[p][k]).unwrap_or(0.0);
     // The cells of the particles, and the volumes in all cells that their domains overlap.
     let add = |p: usize, own: &mut Vec<[u32; D]>, volumes: &mut FxHashMap<[u32; D], f64>| {
@@ -63,8 +67,8 @@ fn of_field<const D: usize>(
         let whole: f64 = (0..D).map(|k| grid.spacing * pieces.within(cell[k], grid.cells[k])).product();
         (padded(*cell), volume / whole)
     };
-    let range = supports.nodes_of(field);
-    let of_field = supports.active().ids().skip(range.start).take(range.len());
+    let range = connectivity.nodes_of(field);
+    let of_field = connectivity.active().ids().skip(range.start).take(range.len());
     let nodes: Vec<[u32; 3]> = of_field.map(|id| padded(grid.index(id))).collect();
     let cells = volumes.iter().map(share).collect();
     let occupied = Occupied { dimension: D, grid: padded(grid.cells), nodes: &nodes, cells };

@@ -15,11 +15,11 @@ impl<const D: usize> Tangent<'_, D> {
         let (mut form, cells) = self.occupied_cells();
         let tiles = D.pow(4);
         // The form takes gradients in units of 1/h.
-        let factor = self.supports().grid().spacing.recip().powi(2);
+        let factor = self.connectivity().grid().spacing.recip().powi(2);
         let gradients: Vec<Tensor<f64, D>> = (0..D * D).map(|jl| unit_gradient(jl / D, jl % D)).collect();
         let changes: Vec<_> = gradients.iter().map(|gradient| self.pressure_changes(gradient)).collect();
         // The moduli of the cells of each group: ∂σ_ik/∂L_jl at ((i D + k) D + j) D + l.
-        let moduli = self.supports().map_groups(|group| {
+        let moduli = self.connectivity().map_groups(|group| {
             let (own, slots) = distinct(&cells[group.number]);
             let mut moduli = vec![0.0; own.len() * tiles];
             for (jl, changes) in changes.iter().enumerate() {
@@ -45,17 +45,17 @@ impl<const D: usize> Tangent<'_, D> {
     /// The form without tangent moduli: nodes, occupied cells, and masses. Also the cells of the particles of every group.
     pub(super) fn occupied_cells(&self) -> (LocalForm, Vec<[Option<usize>; LANES]>) {
         let mut form = LocalForm {
-            grid: self.supports().lattice_cells(),
-            aggregated: self.supports().extension().is_some(),
-            degree: self.supports().extension().map_or(0, |extension| extension.degree()),
-            nodes: self.supports().lattice_nodes(),
+            grid: self.connectivity().lattice_cells(),
+            aggregated: self.connectivity().extension().is_some(),
+            degree: self.connectivity().extension().map_or(0, |extension| extension.degree()),
+            nodes: self.connectivity().lattice_nodes(),
             prescribed: self.space.prescribed_mask(),
             follows: self.space.following_mask(),
             ..LocalForm::default()
         };
         let mut places = FxHashMap::default();
-        let mut cells = Vec::with_capacity(self.supports().groups());
-        self.supports().each_group(|group| {
+        let mut cells = Vec::with_capacity(self.connectivity().groups());
+        self.connectivity().each_group(|group| {
             let (mut of_lanes, mut shares) = ([None; LANES], [Vector::<f64, 4>::zeros(); LANES]);
             let lanes = group.particles.iter().map(|&p| p as usize).enumerate();
             for (lane, p) in lanes.filter(|&(_, p)| self.mass.particles.is_solid(p)) {
@@ -79,7 +79,7 @@ impl<const D: usize> Tangent<'_, D> {
         let mut unit = At::<f64, D, D>::zero();
         unit.value[0] = [1.0; LANES];
         let at_rest = self.pressure_changes(&Tensor::zeros());
-        let masses = self.supports().map_groups(|group| {
+        let masses = self.connectivity().map_groups(|group| {
             let mut sums = At::<f64, D, D>::zero();
             self.data.add_product_of_group(&self.mass, &at_rest, group, &unit, &mut sums);
             sums.value[0]
@@ -93,15 +93,15 @@ impl<const D: usize> Tangent<'_, D> {
 
     /// δp of all averaged cells under one gradient, the same at all particles.
     fn pressure_changes(&self, gradient: &Tensor<f64, D>) -> PressureChanges {
-        self.data.pressure_changes(self.supports(), Along::Gradient(gradient))
+        self.data.pressure_changes(self.connectivity(), Along::Gradient(gradient))
     }
 
     /// The cell of a particle in the lattice of the nodal fields, the volume of the particle over that of the cell, and this share times x.
     fn share_of_cell(&self, p: usize) -> ([u32; 3], Vector<f64, 4>) {
-        let (grid, particles) = (self.supports().grid(), self.mass.particles);
+        let (grid, particles) = (self.connectivity().grid(), self.mass.particles);
         let (x, volume) = (&particles.reference().position[p], particles.reference().volume(p));
         let within = grid.cell(x).unwrap_or([0; D]);
-        let at = self.supports().in_lattice(self.supports().field_of(particles.body[p]), within);
+        let at = self.connectivity().in_lattice(self.connectivity().field_of(particles.body[p]), within);
         let mut share = Vector::zeros();
         share[0] = volume / grid.spacing.powi(D as i32);
         for k in 0..D {
@@ -114,10 +114,10 @@ impl<const D: usize> Tangent<'_, D> {
     /// For each node, the force at the node under uniform motions of its nodal field along the axes, from the terms at nodes. The other fields
     /// rest, since contact resists relative motions.
     fn blocks_under_uniform_motion(&self) -> Vec<Tensor<f64, D>> {
-        let nodes = self.supports().nodes();
+        let nodes = self.connectivity().nodes();
         let mut blocks = vec![Tensor::<f64, D>::zeros(); nodes];
-        for (field, k) in (0..self.supports().field_count()).flat_map(|field| (0..D).map(move |k| (field, k))) {
-            let moving = self.supports().nodes_of(field);
+        for (field, k) in (0..self.connectivity().field_count()).flat_map(|field| (0..D).map(move |k| (field, k))) {
+            let moving = self.connectivity().nodes_of(field);
             let mut uniform = vec![Vector::<f64, D>::zeros(); nodes];
             uniform[moving.clone()].fill(Vector::from_fn(|i, _| if i == k { 1.0 } else { 0.0 }));
             let mut out = vec![Vector::<f64, D>::zeros(); nodes];

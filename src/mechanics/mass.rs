@@ -1,6 +1,6 @@
 //! The mass operator M̃ = (1−ε) M + ε lumped(M), with M_IJ = Σ_p m N_I N_J (eq. 42): product, projection, diagonal.
 
-use crate::mechanics::sweep::{At, Group, Mode, Supports, Weights};
+use crate::mechanics::sweep::{At, Connectivity, Group, Mode, Weights};
 use crate::parallel::{self, PART};
 use crate::particles::Particles;
 use crate::pooled::Pooled;
@@ -24,7 +24,7 @@ pub struct Mass<'a, const D: usize> {
     /// The particles.
     pub particles: &'a Particles<D>,
     /// The shape functions of the particles.
-    pub supports: &'a Supports<D>,
+    pub connectivity: &'a Connectivity<D>,
     /// The lumped mass of every active node.
     pub lumped: &'a [f64],
     /// ε
@@ -32,9 +32,9 @@ pub struct Mass<'a, const D: usize> {
 }
 
 /// Σ_p m N_I at every active node.
-pub fn lumped<const D: usize>(particles: &Particles<D>, supports: &Supports<D>) -> Pooled<f64> {
-    let mut mass = supports.field();
-    supports.spread(bytemuck::cast_slice_mut(&mut mass), |p| Vector::from([particles.mass[p]]));
+pub fn lumped<const D: usize>(particles: &Particles<D>, connectivity: &Connectivity<D>) -> Pooled<f64> {
+    let mut mass = connectivity.field();
+    connectivity.spread(bytemuck::cast_slice_mut(&mut mass), |p| Vector::from([particles.mass[p]]));
     mass
 }
 
@@ -57,7 +57,7 @@ impl<const D: usize> Mass<'_, D> {
         self.add_lumped(factor, u, out);
         if self.lumping < 1.0 {
             mutant!("mass: the product takes ε for 1 − ε": factor = factor * self.lumping / (1.0 - self.lumping));
-            self.supports.sweep(Some(u), Mode::VALUE, out, |group, at, sums| {
+            self.connectivity.sweep(Some(u), Mode::VALUE, out, |group, at, sums| {
                 self.add_consistent(factor, group, at, sums);
             });
         }
@@ -88,11 +88,11 @@ impl<const D: usize> Mass<'_, D> {
     /// # Errors
     /// The sums overflow.
     pub(crate) fn project(&self, fields: [&[Vector<f64, D>]; 2]) -> Result<(TwoFields<D>, usize), LinearError> {
-        let space = self.supports.space([]);
+        let space = self.connectivity.space([]);
         let lumped = restricted(&space, self.lumped);
         let right = |field: &[Vector<f64, D>]| {
-            let mut out: Pooled<Vector<f64, D>> = self.supports.field();
-            self.supports.spread(&mut out, |p| field[p] * self.particles.mass[p]);
+            let mut out: Pooled<Vector<f64, D>> = self.connectivity.field();
+            self.connectivity.spread(&mut out, |p| field[p] * self.particles.mass[p]);
             space.followers().restrict(&mut out);
             out
         };
@@ -113,8 +113,8 @@ impl<const D: usize> Mass<'_, D> {
 
     /// 1/M̃_II; zero at nodes without mass and at outer nodes.
     fn inverse_diagonal(&self, space: &Space<D>) -> Pooled<f64> {
-        let mut diagonal = self.supports.pool().collect(self.lumped.iter().map(|m| self.lumping * m));
-        self.supports.spread_with(Weights::Square, bytemuck::cast_slice_mut(&mut diagonal), |p| {
+        let mut diagonal = self.connectivity.pool().collect(self.lumped.iter().map(|m| self.lumping * m));
+        self.connectivity.spread_with(Weights::Square, bytemuck::cast_slice_mut(&mut diagonal), |p| {
             Vector::from([(1.0 - self.lumping) * self.particles.mass[p]])
         });
         for (outer, _, leaders) in space.followers().rows() {
@@ -134,14 +134,14 @@ impl<const D: usize> Mass<'_, D> {
         inverse_diagonal: &[f64],
         field: &mut [Vector<f64, D>],
     ) -> Result<usize, LinearError> {
-        let right = self.supports.pool().collect(field.iter().copied());
+        let right = self.connectivity.pool().collect(field.iter().copied());
         field.fill(Vector::zeros());
         let settings = ConjugateGradientSettings {
             relative_tolerance: PROJECTION_TOLERANCE,
             max_iterations: 10 * right.len() + 100,
         };
         let (right, solution) = (bytemuck::cast_slice(&right), bytemuck::cast_slice_mut(field));
-        let vectors = self.supports.pool();
+        let vectors = self.connectivity.pool();
         // Eᵀ M̃ E
         let operator = |x: &[f64], y: &mut [f64]| {
             let mut x: Pooled<Vector<f64, D>> = vectors.collect(bytemuck::cast_slice(x).iter().copied());

@@ -66,7 +66,7 @@ impl<const D: usize> LinearOperator for MixedTangent<'_, D> {
 impl<const D: usize> MixedTangent<'_, D> {
     /// B_c K_II⁻¹ B_cᵀ of every cell, with the diagonal blocks K_II.
     fn compliance(&self) -> Vec<f64> {
-        let (space, supports) = (&self.tangent.space, self.tangent.supports());
+        let (space, connectivity) = (&self.tangent.space, self.tangent.connectivity());
         let held = space.prescribed_mask();
         let mut blocks = self.tangent.diagonal_blocks();
         for (node, block) in blocks.iter_mut().enumerate() {
@@ -75,7 +75,7 @@ impl<const D: usize> MixedTangent<'_, D> {
             let finite = inverted.iter().all(|x| x.is_finite());
             *block = Tensor::from_fn(|i, k| if finite && free(i) && free(k) { inverted[(i, k)] } else { 0.0 });
         }
-        let functions = |particle| space.functions(supports, particle);
+        let functions = |particle| space.functions(connectivity, particle);
         self.tangent.mixed_cells().map_or_else(Vec::new, |rows| rows.compliance(&functions, &blocks))
     }
 
@@ -106,7 +106,7 @@ impl<const D: usize> SaddlePoint for MixedTangent<'_, D> {
         let extended = self.tangent.space.extended_in_pool(u);
         match self.tangent.mixed_cells() {
             Some(rows) => {
-                v.copy_from_slice(&rows.volume_changes(self.tangent.supports(), extended.as_deref().unwrap_or(u)));
+                v.copy_from_slice(&rows.volume_changes(self.tangent.connectivity(), extended.as_deref().unwrap_or(u)));
             }
             None => v.fill(0.0),
         }
@@ -117,7 +117,7 @@ impl<const D: usize> SaddlePoint for MixedTangent<'_, D> {
     }
 
     fn cells(&self) -> PressureCells {
-        let (supports, grid) = (self.tangent.supports(), self.tangent.supports().grid());
+        let (connectivity, grid) = (self.tangent.connectivity(), self.tangent.connectivity().grid());
         let mut all = PressureCells {
             occupied: self.tangent.occupied_cells().0,
             compliance: self.compliance(),
@@ -125,7 +125,7 @@ impl<const D: usize> SaddlePoint for MixedTangent<'_, D> {
             ..PressureCells::default()
         };
         for cell in self.cells() {
-            let index = supports.in_lattice(cell.field, cell.index);
+            let index = connectivity.in_lattice(cell.field, cell.index);
             let local = |k: usize| (cell.centroid[k] - grid.origin[k]) / grid.spacing;
             let shift = |k: usize| f64::from(index[k] - cell.index[k]);
             all.index.push(index);

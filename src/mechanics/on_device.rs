@@ -34,13 +34,13 @@ impl<const D: usize> Tangent<'_, D> {
 
     /// The tangent on the device of its shape functions, if they have one.
     pub(super) fn device_tangent(&self) -> Option<DeviceTangent> {
-        let transfer: Arc<Transfer> = self.supports().on_device()?.clone();
+        let transfer: Arc<Transfer> = self.connectivity().on_device()?.clone();
         if self.data.stresses.len() + self.data.cells.len() > gpu::SETS {
             return None;
         }
         let (gpu, mass, factor) = (transfer.gpu().clone(), &self.mass, self.data.mass);
         let inertia = (factor != 0.0).then(|| {
-            let masses = self.supports().masses_on_device(&gpu, |p| mass.particles.mass[p], mass.lumped);
+            let masses = self.connectivity().masses_on_device(&gpu, |p| mass.particles.mass[p], mass.lumped);
             Inertia { masses, factor, lumping: mass.lumping }
         });
         let prescribed: Vec<u8> = self.space.prescribed_mask().into_iter().map(u8::from).collect();
@@ -48,10 +48,10 @@ impl<const D: usize> Tangent<'_, D> {
         let extended = if followers.is_some() { prescribed.len() } else { 0 };
         Some(DeviceTangent(Product {
             inertia,
-            rows: self.data.rows_on_device(&gpu, self.supports()),
+            rows: self.data.rows_on_device(&gpu, self.connectivity()),
             points: [
-                self.data.pressures.on_device(&gpu, self.supports()),
-                self.data.contacts.on_device(&gpu, self.supports().nodes()),
+                self.data.pressures.on_device(&gpu, self.connectivity()),
+                self.data.contacts.on_device(&gpu, self.connectivity().nodes()),
             ],
             prescribed: gpu.copy_of(&prescribed),
             followers,

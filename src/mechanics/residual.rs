@@ -65,7 +65,7 @@ pub struct Equilibrium<'a, const D: usize, L> {
 impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
     /// The equilibrium of a step with these prescribed degrees of freedom.
     pub fn new(step: Step<'a, D, L>, prescribed: &'a [PrescribedDof]) -> Self {
-        let space = step.supports.space(prescribed.iter().map(PrescribedDof::place));
+        let space = step.connectivity.space(prescribed.iter().map(PrescribedDof::place));
         Self { step, terms: Terms::of(&step), prescribed, space: space.into(), mixed: false, stop: None }
     }
 
@@ -139,8 +139,8 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
         points.retain(|(mode, _)| !magnitude || mode.gradient);
         let (modes, all): (Vec<_>, Vec<_>) = points.into_iter().unzip();
         if let Some(mode) = modes.into_iter().reduce(Mode::and) {
-            let (supports, failure) = (self.step.supports, First::none());
-            supports.sweep(Some(phi), Mode { weights, ..mode }, out, |group, at, sums| {
+            let (connectivity, failure) = (self.step.connectivity, First::none());
+            connectivity.sweep(Some(phi), Mode { weights, ..mode }, out, |group, at, sums| {
                 let added = all.iter().try_for_each(|add| add(group, at, sums));
                 if let Err(error) = added {
                     failure.keep(error.particle, error);
@@ -149,7 +149,7 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
                     sums.gradient.as_flattened_mut().as_flattened_mut().iter_mut().for_each(|x| *x = x.abs());
                 }
             });
-            failure.check(supports.processes())?;
+            failure.check(connectivity.processes())?;
         }
         match magnitude {
             true => self.space.followers().restrict_magnitudes(out),
@@ -177,7 +177,7 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
 
     /// The sum of the terms of one role.
     pub(crate) fn forces(&self, role: Role, phi: &[Vector<f64, D>]) -> Result<Pooled<Vector<f64, D>>, Inadmissible> {
-        let mut force = self.step.supports.field();
+        let mut force = self.step.connectivity.field();
         self.sum_into(|_, of| of == role, Part::Whole, Weights::Signed, Trial::motion(phi), &mut force)?;
         Ok(force)
     }
@@ -215,7 +215,7 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
     }
 
     fn magnitudes(&self, at: Trial<'_, f64, D>) -> Result<Pooled<Vector<f64, D>>, Inadmissible> {
-        let mut out = self.step.supports.field();
+        let mut out = self.step.connectivity.field();
         self.terms.add_magnitudes_at_nodes(&self.space.extended(at.phi), &mut out);
         self.sum_into(|_, _| true, Part::Whole, Weights::Magnitude, at, &mut out)?;
         Ok(out)

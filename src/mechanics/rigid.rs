@@ -4,7 +4,7 @@
 use crate::grid::Grid;
 use crate::material::Law;
 use crate::mechanics::residual::Equilibrium;
-use crate::mechanics::sweep::Supports;
+use crate::mechanics::sweep::Connectivity;
 use crate::mechanics::terms::Step;
 use crate::solver::rigid_motions;
 use crate::space::Nodes;
@@ -44,9 +44,9 @@ pub(crate) fn loose<const D: usize, L: Law>(
     equilibrium: &Equilibrium<'_, D, L>,
     nodes: &Nodes,
 ) -> Option<Loose> {
-    let Step { supports, particles, bodies, .. } = equilibrium.step;
+    let Step { connectivity, particles, bodies, .. } = equilibrium.step;
     let positions: Vec<Vector<f64, D>> = nodes.positions(grid).map(|(_, x)| x).collect();
-    let group = groups(supports, positions.len());
+    let group = groups(connectivity, positions.len());
     let force = equilibrium.external_force(&vec![Vector::zeros(); positions.len()]).ok()?;
     let mut of_group: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
     group.iter().enumerate().for_each(|(node, &root)| of_group.entry(root).or_default().push(node));
@@ -54,8 +54,9 @@ pub(crate) fn loose<const D: usize, L: Law>(
         let held = equilibrium.prescribed.iter().filter(|dof| group[dof.node] == root);
         let held = held.map(|dof| (dof.node, dof.component));
         if let Some(axis) = pushed(&positions, &members, held, &force) {
-            let of_root = |&p: &usize| supports.of(p).next().is_some_and(|(node, ..)| group[node] == root);
-            let found: BTreeSet<u32> = (0..supports.particles()).filter(of_root).map(|p| particles.body[p]).collect();
+            let of_root = |&p: &usize| connectivity.of(p).next().is_some_and(|(node, ..)| group[node] == root);
+            let found: BTreeSet<u32> =
+                (0..connectivity.particles()).filter(of_root).map(|p| particles.body[p]).collect();
             let bodies = found.into_iter().map(|body| bodies[body as usize].name.clone()).collect();
             return Some(Loose { bodies, axis });
         }
@@ -64,7 +65,7 @@ pub(crate) fn loose<const D: usize, L: Law>(
 }
 
 /// For each node, the smallest node that particles connect it with.
-fn groups<const D: usize>(supports: &Supports<D>, count: usize) -> Vec<usize> {
+fn groups<const D: usize>(connectivity: &Connectivity<D>, count: usize) -> Vec<usize> {
     fn root(parent: &mut [usize], mut node: usize) -> usize {
         while parent[node] != node {
             parent[node] = parent[parent[node]];
@@ -73,9 +74,9 @@ fn groups<const D: usize>(supports: &Supports<D>, count: usize) -> Vec<usize> {
         node
     }
     let mut parent: Vec<usize> = (0..count).collect();
-    for p in 0..supports.particles() {
+    for p in 0..connectivity.particles() {
         let mut last = None;
-        for (node, ..) in supports.of(p) {
+        for (node, ..) in connectivity.of(p) {
             let one = root(&mut parent, node);
             let other = last.map_or(one, |last| root(&mut parent, last));
             parent[one.max(other)] = one.min(other);

@@ -9,7 +9,7 @@
 //! high order everywhere, and with first order only at nodes where the velocity has a kink or an extremum. Jameson, Schmidt and Turkel
 //! (1981) do so in gas dynamics, with differences of second and fourth order.
 
-use crate::mechanics::sweep::Supports;
+use crate::mechanics::sweep::Connectivity;
 use crate::particles::Particles;
 use crate::pooled::Pooled;
 use crate::tensor::Vector;
@@ -38,19 +38,19 @@ const ROUND_OFF: f64 = 1e-12;
 /// q_I = |v̄_I − v̿_I|² / σ_I²,  v̿ = M_L⁻¹ M v̄,  σ_I² = Σ_p m N_I |v_p − v̄_I|² / m_I.
 ///
 /// ```
-/// use bfree::mechanics::{check::direction, smoothing::Smoothing, sweep::Supports, transfer::Nodal};
+/// use bfree::mechanics::{check::direction, smoothing::Smoothing, sweep::Connectivity, transfer::Nodal};
 /// use bfree::tensor::Vector;
 ///
 /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
 /// let mut simulation = scene.build::<2>("scenes".as_ref())?;
 /// let particles = &mut simulation.particles;
 /// particles.velocity = direction(particles.len(), 1); // full of modes that nodes cannot represent
-/// let (supports, _) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
-/// let mass = Nodal::at_rest(particles, &supports).mass;
+/// let (connectivity, _) = Connectivity::new(&simulation.approximation, &simulation.grid, &particles.position)?;
+/// let mass = Nodal::at_rest(particles, &connectivity).mass;
 ///
 /// let (smoothing, dt) = (Smoothing::limited(40.0), 0.05);
-/// let at_kinks = smoothing.shares_at_kinks(particles, &supports, &mass, dt);
-/// let change = smoothing.change(particles, &supports, &mass, at_kinks.as_deref(), &particles.velocity, dt);
+/// let at_kinks = smoothing.shares_at_kinks(particles, &connectivity, &mass, dt);
+/// let change = smoothing.change(particles, &connectivity, &mass, at_kinks.as_deref(), &particles.velocity, dt);
 /// // Momentum is conserved, energy is lost.
 /// let given: Vector<f64, 2> = change.iter().zip(&particles.mass).map(|(dv, &m)| dv * m).sum();
 /// assert!(given.norm() < 1e-13 * particles.mass.iter().sum::<f64>());
@@ -109,7 +109,7 @@ impl Smoothing {
     pub fn shares_at_kinks<const D: usize>(
         &self,
         particles: &Particles<D>,
-        supports: &Supports<D>,
+        connectivity: &Connectivity<D>,
         mass: &[f64],
         dt: f64,
     ) -> Option<Pooled<f64>> {
@@ -118,11 +118,11 @@ impl Smoothing {
         }
         // In the frame of the centre of mass, the variance ⟨v²⟩ − v̄² loses the fewest digits.
         let frame = particles.momentum() / particles.mass.iter().sum::<f64>();
-        let velocity = supports.pool().collect(particles.velocity.iter().map(|v| v - frame));
-        let mean = nodal_mean(particles, supports, mass, &velocity);
-        let squares = supports.pool().collect(velocity.iter().map(|v| Vector::from([v.norm_squared()])));
-        let mean_square = nodal_mean(particles, supports, mass, &squares);
-        let mean_of_mean = nodal_mean(particles, supports, mass, &supports.values(&mean));
+        let velocity = connectivity.pool().collect(particles.velocity.iter().map(|v| v - frame));
+        let mean = nodal_mean(particles, connectivity, mass, &velocity);
+        let squares = connectivity.pool().collect(velocity.iter().map(|v| Vector::from([v.norm_squared()])));
+        let mean_square = nodal_mean(particles, connectivity, mass, &squares);
+        let mean_of_mean = nodal_mean(particles, connectivity, mass, &connectivity.values(&mean));
         let share = |((v, v_twice), square): ((&Vector<f64, D>, &Vector<f64, D>), &Vector<f64, 1>)| {
             let variance = (square[0] - v.norm_squared()).max(0.0) + ROUND_OFF * square[0];
             let q = if variance > 0.0 { (v - v_twice).norm_squared() / variance } else { 0.0 };
@@ -130,7 +130,7 @@ impl Smoothing {
             // The share is zero without a kink, also for an infinite rate.
             if kink > 0.0 { -(-self.at_kinks * kink * dt).exp_m1() } else { 0.0 }
         };
-        Some(supports.pool().collect(mean.iter().zip(&mean_of_mean).zip(&mean_square).map(share)))
+        Some(connectivity.pool().collect(mean.iter().zip(&mean_of_mean).zip(&mean_square).map(share)))
     }
 
     /// −θ (u_p − Σ N w) − Σ N_I θ_I (u_p − ū_I) for a particle field u. `mass` is M_L at the active nodes, `at_kinks` is from
@@ -140,7 +140,7 @@ impl Smoothing {
     pub fn change<const D: usize>(
         &self,
         particles: &Particles<D>,
-        supports: &Supports<D>,
+        connectivity: &Connectivity<D>,
         mass: &[f64],
         at_kinks: Option<&[f64]>,
         field: &[Vector<f64, D>],
@@ -148,17 +148,17 @@ impl Smoothing {
     ) -> Pooled<Vector<f64, D>> {
         let theta = self.share(dt);
         // r_j = (I − N M_L⁻¹ Nᵀm)^j u at the particles, and Σ N w = u − r_k.
-        let mut change = supports.pool().collect(field.iter().copied());
+        let mut change = connectivity.pool().collect(field.iter().copied());
         for _ in 0..self.order {
-            let smooth = nodal_mean(particles, supports, mass, &change);
-            change.iter_mut().zip(&*supports.values(&smooth)).for_each(|(change, smooth)| *change -= smooth);
+            let smooth = nodal_mean(particles, connectivity, mass, &change);
+            change.iter_mut().zip(&*connectivity.values(&smooth)).for_each(|(change, smooth)| *change -= smooth);
         }
         change.iter_mut().for_each(|r| *r *= -theta);
         if let Some(shares) = at_kinks {
-            let mut drawn = nodal_mean(particles, supports, mass, field);
+            let mut drawn = nodal_mean(particles, connectivity, mass, field);
             drawn.iter_mut().zip(shares).for_each(|(u, &share)| *u *= share);
-            let shares = supports.values::<1>(bytemuck::cast_slice(shares));
-            let drawn = supports.values(&drawn);
+            let shares = connectivity.values::<1>(bytemuck::cast_slice(shares));
+            let drawn = connectivity.values(&drawn);
             for (((change, u), share), drawn) in change.iter_mut().zip(field).zip(&*shares).zip(&*drawn) {
                 *change -= u * share[0];
                 *change += drawn;
@@ -171,12 +171,12 @@ impl Smoothing {
 /// M_L⁻¹ Σ_p N m u_p
 fn nodal_mean<const C: usize, const D: usize>(
     particles: &Particles<D>,
-    supports: &Supports<D>,
+    connectivity: &Connectivity<D>,
     mass: &[f64],
     field: &[Vector<f64, C>],
 ) -> Pooled<Vector<f64, C>> {
-    let mut out: Pooled<Vector<f64, C>> = supports.field();
-    supports.spread(&mut out, |p| field[p] * particles.mass[p]);
+    let mut out: Pooled<Vector<f64, C>> = connectivity.field();
+    connectivity.spread(&mut out, |p| field[p] * particles.mass[p]);
     for (w, &m) in out.iter_mut().zip(mass) {
         // A node without mass has no weight in later sums either.
         *w = if m > 0.0 { *w / m } else { Vector::zeros() };

@@ -6,7 +6,7 @@ use crate::mechanics::constitutive::{Form, Laws};
 use crate::mechanics::linearized::{CellRows, Linearized};
 use crate::mechanics::mass::Mass;
 use crate::mechanics::residual::{Equilibrium, Inadmissible};
-use crate::mechanics::sweep::{Group, Quadratic, Supports};
+use crate::mechanics::sweep::{Connectivity, Group, Quadratic};
 use crate::mechanics::terms::Piece;
 use crate::mechanics::trial::Trial;
 use crate::parallel::{self, PART};
@@ -55,8 +55,8 @@ pub struct Tangent<'a, const D: usize> {
 }
 
 impl<'a, const D: usize> Tangent<'a, D> {
-    pub(super) fn supports(&self) -> &'a Supports<D> {
-        self.mass.supports
+    pub(super) fn connectivity(&self) -> &'a Connectivity<D> {
+        self.mass.connectivity
     }
 
     /// K u on the free degrees of freedom. `u` must be zero on prescribed degrees of freedom.
@@ -81,14 +81,14 @@ impl<'a, const D: usize> Tangent<'a, D> {
 
     /// K_II of every active node. Values that are prescribed or follow inner nodes have the row and column of the identity.
     pub fn diagonal_blocks(&self) -> Pooled<Tensor<f64, D>> {
-        let mut blocks: Pooled<Tensor<f64, D>> = self.supports().field();
+        let mut blocks: Pooled<Tensor<f64, D>> = self.connectivity().field();
         self.data.add_blocks_at_nodes(&self.mass, &mut blocks);
         self.space.restrict_blocks(&mut blocks);
-        let functions = |particle| self.space.functions(self.supports(), particle);
+        let functions = |particle| self.space.functions(self.connectivity(), particle);
         self.data.add_blocks_of_functions(&functions, &mut blocks);
         if self.data.has_quadratic(&self.mass) {
             let quadratic = |group: Group<'_>, form: &mut Quadratic| self.data.add_quadratic(&self.mass, group, form);
-            self.supports().blocks(&mut blocks, &quadratic);
+            self.connectivity().blocks(&mut blocks, &quadratic);
             self.add_followers(&quadratic, &mut blocks);
         }
         self.space.finish_blocks(&mut blocks);
@@ -101,19 +101,19 @@ impl<'a, const D: usize> Tangent<'a, D> {
         if self.space.followers().is_empty() {
             return;
         }
-        let reached = self.space.reached(self.supports());
+        let reached = self.space.reached(self.connectivity());
         let corrections = |group: Group<'_>| {
             let mut added = Vec::new();
             if group.particles.iter().any(|&p| reached[p as usize]) {
                 let mut form = Quadratic::zero();
                 quadratic(group, &mut form);
                 for (lane, &p) in group.particles.iter().enumerate().filter(|(_, p)| reached[**p as usize]) {
-                    self.space.add_followers(self.supports(), p as usize, &form, lane, &mut added);
+                    self.space.add_followers(self.connectivity(), p as usize, &form, lane, &mut added);
                 }
             }
             added
         };
-        let added = self.supports().map_groups(corrections);
+        let added = self.connectivity().map_groups(corrections);
         added.into_iter().flatten().for_each(|(node, block)| blocks[node] += block);
     }
 }
@@ -148,24 +148,24 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
 /// Bytes of the linearised tangent of all particles. With `discrete_gradient` it is that of the mean stress of a step.
 ///
 /// ```
-/// use bfree::mechanics::{sweep::Supports, tangent::tangent_bytes};
+/// use bfree::mechanics::{sweep::Connectivity, tangent::tangent_bytes};
 ///
 /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
 /// let simulation = scene.build::<2>("scenes".as_ref())?;
 /// let (particles, bodies) = (&simulation.particles, &simulation.bodies);
-/// let (supports, _) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
+/// let (connectivity, _) = Connectivity::new(&simulation.approximation, &simulation.grid, &particles.position)?;
 /// // A neo-Hookean particle in 2D needs A, the symmetric B, κ and q: 9 numbers.
-/// assert!(tangent_bytes(particles, bodies, &supports, false) >= 9 * size_of::<f64>() * particles.len());
+/// assert!(tangent_bytes(particles, bodies, &connectivity, false) >= 9 * size_of::<f64>() * particles.len());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn tangent_bytes<const D: usize, L: Law>(
     particles: &Particles<D>,
     bodies: &[Body<L>],
-    supports: &Supports<D>,
+    connectivity: &Connectivity<D>,
     discrete_gradient: bool,
 ) -> usize {
     let form: Form = Laws { particles, bodies, dt: 0.0, discrete_gradient }.form();
-    supports.groups() * form.rows(D) * LANES * size_of::<f64>()
+    connectivity.groups() * form.rows(D) * LANES * size_of::<f64>()
 }
 
 impl<const D: usize> LinearOperator for Tangent<'_, D> {

@@ -6,7 +6,7 @@ use crate::material::Law;
 use crate::mechanics::dilatation::Cells;
 use crate::mechanics::loads::SurfacePoint;
 use crate::mechanics::reference::GridReset;
-use crate::mechanics::sweep::Supports;
+use crate::mechanics::sweep::Connectivity;
 use crate::mechanics::tangent::tangent_bytes;
 use crate::mechanics::terms::dilatation_rows;
 use crate::mechanics::transfer::Projection;
@@ -30,15 +30,15 @@ pub struct ArrayUse {
 /// The arrays that a run of a simulation has.
 pub(super) fn arrays<const D: usize, L: Law, A: ShapeFunction>(
     simulation: &Simulation<D, L, A>,
-    supports: &Supports<D>,
+    connectivity: &Connectivity<D>,
     cells: usize,
 ) -> Vec<ArrayUse> {
     let whole = [
-        simulation.particle_arrays(supports),
-        simulation.nodal_arrays(supports.nodes()),
-        simulation.solver_arrays(supports, cells),
+        simulation.particle_arrays(connectivity),
+        simulation.nodal_arrays(connectivity.nodes()),
+        simulation.solver_arrays(connectivity, cells),
     ];
-    let shared = simulation.pass_arrays(supports).into_iter().map(|row| (row, supports.is_tiled()));
+    let shared = simulation.pass_arrays(connectivity).into_iter().map(|row| (row, connectivity.is_tiled()));
     let whole = whole.concat().into_iter().map(|row| (row, false));
     let used = shared.chain(whole).filter(|((used, ..), _)| *used);
     used.map(|((_, name, bytes), is_shared)| ArrayUse { name, bytes: bytes as u64, is_shared }).collect()
@@ -65,18 +65,18 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     }
 
     /// The arrays of the passes over the particles.
-    fn pass_arrays(&self, supports: &Supports<D>) -> Vec<Row> {
-        let linearized = tangent_bytes(&self.particles, &self.bodies, supports, self.has_mean_stress());
-        let boxes = supports.box_bytes(1);
+    fn pass_arrays(&self, connectivity: &Connectivity<D>) -> Vec<Row> {
+        let linearized = tangent_bytes(&self.particles, &self.bodies, connectivity, self.has_mean_stress());
+        let boxes = connectivity.box_bytes(1);
         vec![
-            (true, "shape functions: N, dN/dx by axis", supports.bytes()),
+            (true, "shape functions: N, dN/dx by axis", connectivity.bytes()),
             (true, "linearized tangent", linearized),
             (boxes > 0, "boxes of nodes, one for each block of cells", boxes),
         ]
     }
 
-    fn particle_arrays(&self, supports: &Supports<D>) -> Vec<Row> {
-        let (settings, count, nodes) = (&self.settings, self.particles.len(), supports.nodes());
+    fn particle_arrays(&self, connectivity: &Connectivity<D>) -> Vec<Row> {
+        let (settings, count, nodes) = (&self.settings, self.particles.len(), connectivity.nodes());
         let variable_count = self.particles.variable_count;
         let consistent = self.has_inertia() && settings.lumping < 1.0;
         let smooths = self.has_inertia() && settings.smoothing.is_some();
@@ -91,7 +91,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             // The part of the field that nodes cannot represent, its change, and the change of the other field.
             (smooths, "particles: smoothing", count * 3 * Self::VECTOR),
             (fits, "affine fits of v, a", fit_bytes),
-            (supports.is_tiled(), "particles: the order of the sweep", count * 2 * size_of::<u64>()),
+            (connectivity.is_tiled(), "particles: the order of the sweep", count * 2 * size_of::<u64>()),
         ]
     }
 
@@ -130,16 +130,16 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         ]
     }
 
-    fn solver_arrays(&self, supports: &Supports<D>, cells: usize) -> Vec<Row> {
-        let nodes = supports.nodes();
+    fn solver_arrays(&self, connectivity: &Connectivity<D>, cells: usize) -> Vec<Row> {
+        let nodes = connectivity.nodes();
         let averages = self.bodies.iter().any(Body::averages);
         // θ, and on a kept grid θ at the last reset; the cell, and the result of a loop over particles there.
         let dilatation_bytes = Cells::BYTES + NUMBER * if self.keeps_grid() { 4 } else { 3 };
         let linearized_dilatation =
-            supports.groups() * LANES * (dilatation_rows(D, self.has_mean_stress()) + 1) * NUMBER;
+            connectivity.groups() * LANES * (dilatation_rows(D, self.has_mean_stress()) + 1) * NUMBER;
         let preconditioner = self.preconditioner().0;
         let multigrid = preconditioner == Preconditioning::Multigrid;
-        let followers = supports.extension().map_or(0, |extension| extension.bytes());
+        let followers = connectivity.extension().map_or(0, |extension| extension.bytes());
         let krylov_vectors = match self.krylov().0 {
             // The basis; residual, correction, trial and product.
             Krylov::Gmres { restart } => restart as usize + 5,

@@ -3,7 +3,7 @@
 use super::Plan;
 use crate::approximation::ShapeFunction;
 use crate::material::Law;
-use crate::mechanics::sweep::SupportError;
+use crate::mechanics::sweep::ConnectivityError;
 use crate::simulation::Simulation;
 use crate::tensor::Vector;
 use indicatif::BinaryBytes;
@@ -48,19 +48,19 @@ impl ProcessUse {
         simulation: &Simulation<D, L, A>,
         plan: &Plan,
         processes: usize,
-    ) -> Result<Self, SupportError> {
+    ) -> Result<Self, ConnectivityError> {
         let sum = |shared: bool| plan.arrays.iter().filter(|one| one.is_shared == shared).map(|one| one.bytes).sum();
         let (shared, mut whole): (u64, u64) = (sum(true), sum(false));
         if processes <= 1 {
             return Ok(Self { processes: 1, share: 1.0, bytes: shared + whole, whole, told: 0 });
         }
-        let supports = simulation.new_supports(None)?;
-        let (count, nodes) = (simulation.particles.len(), supports.nodes());
-        let [largest, told] = supports.largest_shares(processes);
+        let connectivity = simulation.new_connectivity(None)?;
+        let (count, nodes) = (simulation.particles.len(), connectivity.nodes());
+        let [largest, told] = connectivity.largest_shares(processes);
         let vector = size_of::<Vector<f64, D>>();
         // The positions and the places of all particles; the lists of nodes, and the sums of all processes.
         whole += (count * (vector + FOREIGN) + nodes * (2 * size_of::<u32>() + vector)) as u64;
-        let shared = shared + (supports.box_bytes(processes) - supports.box_bytes(1)) as u64;
+        let shared = shared + (connectivity.box_bytes(processes) - connectivity.box_bytes(1)) as u64;
         let share = largest as f64 / count as f64;
         let bytes = whole + (shared as f64 * share) as u64;
         Ok(Self { processes, share, bytes, whole, told: (told * vector) as u64 })

@@ -5,7 +5,7 @@ use crate::approximation::ShapeFunction;
 use crate::gpu::{Gpu, GpuError};
 use crate::lanes::LANES;
 use crate::material::Law;
-use crate::mechanics::sweep::SupportError;
+use crate::mechanics::sweep::ConnectivityError;
 use crate::mechanics::tangent::tangent_bytes;
 use crate::mechanics::terms::dilatation_rows;
 use crate::particles::Body;
@@ -28,12 +28,12 @@ impl DeviceUse {
     /// A particle has no shape functions.
     pub fn of<const D: usize, L: Law, A: ShapeFunction>(
         simulation: &Simulation<D, L, A>,
-    ) -> Result<Self, SupportError> {
-        let supports = simulation.new_supports(None)?;
-        let (settings, nodes) = (&simulation.settings, supports.active().len());
-        let by_lane = supports.groups() * LANES * NUMBER;
+    ) -> Result<Self, ConnectivityError> {
+        let connectivity = simulation.new_connectivity(None)?;
+        let (settings, nodes) = (&simulation.settings, connectivity.active().len());
+        let by_lane = connectivity.groups() * LANES * NUMBER;
         let mean_stress = simulation.has_mean_stress();
-        let laws = tangent_bytes(&simulation.particles, &simulation.bodies, &supports, mean_stress);
+        let laws = tangent_bytes(&simulation.particles, &simulation.bodies, &connectivity, mean_stress);
         let averages = simulation.bodies.iter().any(Body::averages);
         let cells = if averages { by_lane * (dilatation_rows(D, mean_stress) + 1) + by_lane / 2 } else { 0 };
         let has_inertia = settings.scheme.has_inertia();
@@ -50,12 +50,12 @@ impl DeviceUse {
         // The form from which the levels are made stays on the processor.
         let levels = if multigrid { multigrid_bytes(nodes, D) - nodes * D.pow(4) * NUMBER } else { 0 };
         // The filter of cubic functions: neighbours along each axis, scales, and three vectors.
-        let is_cubic = supports.extension().is_some_and(|extension| extension.degree() == 3);
+        let is_cubic = connectivity.extension().is_some_and(|extension| extension.degree() == 3);
         let filter = if multigrid && is_cubic { nodes * D * (2 * size_of::<u32>() + 4 * NUMBER) } else { 0 };
-        let followers = supports.extension().map_or(0, |extension| extension.bytes() + nodes * D * NUMBER);
+        let followers = connectivity.extension().map_or(0, |extension| extension.bytes() + nodes * D * NUMBER);
         // The mask of prescribed values, diagonal blocks, and vectors.
         let nodal = nodes * D * (1 + D * NUMBER + NUMBER * vectors);
-        let [functions, shared] = supports.device_bytes();
+        let [functions, shared] = connectivity.device_bytes();
         let bytes = functions + sets * (laws + cells) + masses + levels + filter + followers + nodal;
         Ok(Self { bytes, shared })
     }

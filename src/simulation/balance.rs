@@ -7,7 +7,7 @@ use crate::mechanics::loads::PrescribedDof;
 use crate::mechanics::path::OnPath;
 use crate::mechanics::residual::{Equilibrium, Inadmissible};
 use crate::mechanics::rigid::loose;
-use crate::mechanics::sweep::Supports;
+use crate::mechanics::sweep::Connectivity;
 use crate::mechanics::transfer::Nodal;
 use crate::mechanics::trial::Trial;
 use crate::particles::Body;
@@ -44,21 +44,21 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// Finds the motion under which forces are in balance.
     pub(super) fn balance<'a>(
         &'a self,
-        supports: &'a Supports<D>,
+        connectivity: &'a Connectivity<D>,
         nodal: &'a Nodal<D>,
         prescribed: &'a [PrescribedDof],
     ) -> Result<Balance<'a, D, L>, StepError> {
         let (dt, scheme, settings) = (self.clock.step(), &*self.settings.scheme, &self.settings.newton);
         let theta = scheme.instant();
         let under = |load| {
-            let equilibrium = self.equilibrium(supports, nodal, prescribed, scheme.balance(dt), load);
+            let equilibrium = self.equilibrium(connectivity, nodal, prescribed, scheme.balance(dt), load);
             Equilibrium { stop: self.settings.stop.as_ref(), mixed: self.is_mixed(), ..equilibrium }
         };
         // A law may have refused a trial that the line search mended. Only refusals of this step explain its failure.
         self.bodies.iter().for_each(|body| _ = body.law.last_failure());
         let mut load = self.load_of_balance();
         let mut equilibrium = under(load);
-        let mut phi = self.initial_guess(supports, nodal, theta * dt);
+        let mut phi = self.initial_guess(connectivity, nodal, theta * dt);
         for dof in prescribed {
             phi[dof.node][dof.component] = theta * dof.step.increment;
         }
@@ -71,7 +71,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             let force = |load| under(load).free_external_force(&nodal.motion);
             let path = OnPath::new(self.path, &start, &force, &self.history.rate, dt)?;
             let x = bytemuck::cast_slice_mut(&mut phi);
-            let report = newton(&path, &mut *preconditioner, x, settings, supports.pool())?;
+            let report = newton(&path, &mut *preconditioner, x, settings, connectivity.pool())?;
             load = path.load(&phi);
             cosine = Some(path.cosine(&phi));
             if path.ends(load)? {
@@ -85,9 +85,9 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
                 preconditioner = Box::new(Saddle::<D>::over(preconditioner));
             }
             let nodal: &[f64] = bytemuck::cast_slice(&phi);
-            let mut x = supports.pool().collect(nodal.iter().chain(&dilatation[0]).copied());
-            let report = newton(&equilibrium, &mut *preconditioner, &mut x, settings, supports.pool())
-                .map_err(|error| self.explained(error, &equilibrium, supports))?;
+            let mut x = connectivity.pool().collect(nodal.iter().chain(&dilatation[0]).copied());
+            let report = newton(&equilibrium, &mut *preconditioner, &mut x, settings, connectivity.pool())
+                .map_err(|error| self.explained(error, &equilibrium, connectivity))?;
             let at = equilibrium.trial(&x);
             phi.copy_from_slice(at.phi);
             dilatation[1] = at.dilatation.to_vec();
@@ -102,7 +102,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         &self,
         error: NewtonError<Inadmissible>,
         equilibrium: &Equilibrium<'_, D, L>,
-        supports: &Supports<D>,
+        connectivity: &Connectivity<D>,
     ) -> StepError {
         if let Some(sentence) = self.bodies.iter().find_map(|body| body.law.last_failure()) {
             return StepError::LawFailed { sentence, source: error };
@@ -113,7 +113,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let is_static = equilibrium.step.nodal.is_static();
         // Contact may hold the bodies, and a shorter step may find it.
         let free = is_static && !self.loads.contacts.exist();
-        if let Some(loose) = free.then(|| loose(&self.grid, equilibrium, supports.active())).flatten() {
+        if let Some(loose) = free.then(|| loose(&self.grid, equilibrium, connectivity.active())).flatten() {
             return StepError::Loose { loose, source: error };
         }
         match self.advice(is_static) {

@@ -9,7 +9,7 @@ use crate::mechanics::contact::{
 };
 use crate::mechanics::loads::{Candidate, Contacts, Obstacle, PointInContact, Pose, RigidBody};
 use crate::mechanics::schemes::Alphas;
-use crate::mechanics::sweep::Supports;
+use crate::mechanics::sweep::Connectivity;
 use crate::mechanics::terms::{ContactForce, Step, penalties};
 use crate::tensor::Vector;
 use nalgebra::Vector3;
@@ -40,12 +40,12 @@ pub(super) struct ContactUpdate<const D: usize> {
 
 impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// Finds the points that may touch another body in the coming step.
-    pub(super) fn find_candidates(&mut self, supports: &Supports<D>) {
+    pub(super) fn find_candidates(&mut self, connectivity: &Connectivity<D>) {
         let Some(mut between) = self.loads.contacts.between.take() else { return };
         let (dt, rate, velocity) = (self.clock.step(), &self.history.rate, &self.particles.velocity);
         let motion = |p: usize| match (velocity.get(p), rate.is_empty()) {
             (Some(v), _) => v * dt,
-            (None, false) => supports.value_at(p, rate) * dt,
+            (None, false) => connectivity.value_at(p, rate) * dt,
             (None, true) => Vector::zeros(),
         };
         between.candidates = candidates(&self.loads.contacts, &between, &self.particles, &self.grid, motion);
@@ -149,7 +149,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let (contacts, reference) = (&self.loads.contacts, self.particles.reference().position);
         let candidates = contacts.between.iter().flat_map(|between| &between.candidates);
         let of = |one: &Candidate<D>| {
-            let position = |carrier: &Carrier<D>| carrier.position(reference, step.supports, phi) * carrier.share;
+            let position = |carrier: &Carrier<D>| carrier.position(reference, step.connectivity, phi) * carrier.share;
             [one.start, one.carriers(contacts).iter().map(position).sum()]
         };
         candidates.map(of).collect()
@@ -158,7 +158,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// The positions of all particles at the end of the step.
     pub(super) fn end_positions(&self, step: &Step<'_, D, L>, phi: &[Vector<f64, D>]) -> Vec<Vector<f64, D>> {
         let mut positions = self.particles.reference().position.to_vec();
-        positions.iter_mut().zip(&*step.supports.values(phi)).for_each(|(x, u)| *x += u);
+        positions.iter_mut().zip(&*step.connectivity.values(phi)).for_each(|(x, u)| *x += u);
         positions
     }
 

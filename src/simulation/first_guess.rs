@@ -5,7 +5,7 @@ use crate::approximation::ShapeFunction;
 use crate::material::Law;
 use crate::mechanics::loads::{Candidate, Pose, PrescribedDof};
 use crate::mechanics::residual::Equilibrium;
-use crate::mechanics::sweep::Supports;
+use crate::mechanics::sweep::Connectivity;
 use crate::mechanics::terms::Step;
 use crate::mechanics::transfer::Nodal;
 use crate::pooled::Pooled;
@@ -47,8 +47,13 @@ fn together<const D: usize>(count: u32, faced: &[Faced<D>]) -> Vec<Vec<u32>> {
 
 impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// The Δφ that Newton's method starts from.
-    pub(super) fn initial_guess(&self, supports: &Supports<D>, nodal: &Nodal<D>, dt: f64) -> Pooled<Vector<f64, D>> {
-        let mut dphi: Pooled<Vector<f64, D>> = supports.field();
+    pub(super) fn initial_guess(
+        &self,
+        connectivity: &Connectivity<D>,
+        nodal: &Nodal<D>,
+        dt: f64,
+    ) -> Pooled<Vector<f64, D>> {
+        let mut dphi: Pooled<Vector<f64, D>> = connectivity.field();
         let rate: &[Vector<f64, D>] = match self.settings.initial_guess {
             InitialGuess::Zero => &[],
             InitialGuess::Velocity => &nodal.velocity,
@@ -67,28 +72,28 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         prescribed: &[PrescribedDof],
         phi: &mut [Vector<f64, D>],
     ) -> Result<(), StepError> {
-        let (contacts, supports) = (&self.loads.contacts, equilibrium.step.supports);
+        let (contacts, connectivity) = (&self.loads.contacts, equilibrium.step.connectivity);
         if self.settings.scheme.has_inertia() || !contacts.exist() {
             return Ok(());
         }
         let poses: Vec<Pose<D>> = contacts.obstacles.iter().map(|one| one.pose(equilibrium.step.time)).collect();
         let is_free = |fields: &[u32], k: usize| {
-            let is_there = |node: usize| fields.iter().any(|&field| supports.nodes_of(field).contains(&node));
+            let is_there = |node: usize| fields.iter().any(|&field| connectivity.nodes_of(field).contains(&node));
             !prescribed.iter().any(|dof| dof.component == k && is_there(dof.node))
         };
         // After each motion, bodies touch an obstacle or others, so there are fewer that move.
-        for _ in 0..=supports.field_count() {
+        for _ in 0..=connectivity.field_count() {
             let (places, faced) = (self.surfaces(&equilibrium.step, phi), self.faced(&equilibrium.step, phi));
             let of =
                 |fields: &[u32]| fields.iter().flat_map(|&field| &places[field as usize]).copied().collect::<Vec<_>>();
-            let mut apart = together(supports.field_count(), &faced);
+            let mut apart = together(connectivity.field_count(), &faced);
             apart.retain(|fields| self.distance_to_obstacles(&of(fields), &poses) >= 0.0);
             if apart.is_empty() {
                 return Ok(());
             }
             let residual = equilibrium.residual(phi)?;
             let motion = |fields: &Vec<u32>| {
-                let nodes = fields.iter().flat_map(|&field| supports.nodes_of(field));
+                let nodes = fields.iter().flat_map(|&field| connectivity.nodes_of(field));
                 let load: Vector<f64, D> = nodes.map(|node| -residual[node]).sum();
                 let free = Vector::<f64, D>::from_fn(|k, _| if is_free(fields, k) { load[k] } else { 0.0 });
                 let along = free.try_normalize(0.0)?;
@@ -97,7 +102,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
                 Some((fields.clone(), along * ways.into_iter().flatten().reduce(f64::min)?))
             };
             let Some((fields, motion)) = apart.iter().find_map(motion) else { return Ok(()) };
-            let nodes = fields.iter().flat_map(|&field| supports.nodes_of(field));
+            let nodes = fields.iter().flat_map(|&field| connectivity.nodes_of(field));
             nodes.for_each(|node| phi[node] += motion);
         }
         Ok(())
@@ -105,10 +110,10 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
 
     /// The positions of the points of surfaces after the nodal motion `phi`, by nodal fields.
     fn surfaces(&self, step: &Step<'_, D, L>, phi: &[Vector<f64, D>]) -> Vec<Vec<Vector<f64, D>>> {
-        let (supports, positions) = (step.supports, self.end_positions(step, phi));
-        let mut places = vec![Vec::new(); supports.field_count() as usize];
+        let (connectivity, positions) = (step.connectivity, self.end_positions(step, phi));
+        let mut places = vec![Vec::new(); connectivity.field_count() as usize];
         for p in self.loads.contacts.points.iter().map(|point| point.particle) {
-            places[supports.field_of(self.particles.body[p]) as usize].push(positions[p]);
+            places[connectivity.field_of(self.particles.body[p]) as usize].push(positions[p]);
         }
         places
     }
@@ -117,7 +122,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     fn faced(&self, step: &Step<'_, D, L>, phi: &[Vector<f64, D>]) -> Vec<Faced<D>> {
         let Some(between) = &self.loads.contacts.between else { return Vec::new() };
         let of = |(one, [_, relative]): (&Candidate<D>, [Vector<f64, D>; 2])| {
-            let [first, second] = between.pairs[one.pair].bodies.map(|body| step.supports.field_of(body));
+            let [first, second] = between.pairs[one.pair].bodies.map(|body| step.connectivity.field_of(body));
             let fields = if one.is_first { [first, second] } else { [second, first] };
             Faced { fields, normal: one.normal, gap: one.normal.dot(&relative) }
         };

@@ -8,7 +8,7 @@ use crate::mechanics::loads::PrescribedDof;
 use crate::mechanics::reference::{GridReset, LastEquilibrium, pairs, reached_body, reached_conditions, touch};
 use crate::mechanics::residual::Inadmissible;
 use crate::mechanics::schemes::Alphas;
-use crate::mechanics::sweep::Supports;
+use crate::mechanics::sweep::Connectivity;
 use crate::mechanics::transfer::{Committed, Nodal, Update};
 use crate::pooled::Pooled;
 use crate::tensor::Vector;
@@ -79,7 +79,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         projected: &Nodal<D>,
         prescribed: &[PrescribedDof],
         accounts: &Accounts<D>,
-        supports: &Supports<D>,
+        connectivity: &Connectivity<D>,
     ) -> f64 {
         self.external_work += accounts.work;
         self.dissipated += accounts.dissipated;
@@ -90,21 +90,21 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         if self.settings.grid_reset != GridReset::EveryStep {
             self.particles.store_reference();
             self.history.rate = update.rate(dt);
-            grid = Some(update.end(projected, supports.pool()));
+            grid = Some(update.end(projected, connectivity.pool()));
         }
-        let Committed { strain, yielding } = update.commit(&mut self.particles, &self.bodies, supports, dt);
+        let Committed { strain, yielding } = update.commit(&mut self.particles, &self.bodies, connectivity, dt);
         if self.clock.steps() == 0 {
-            self.record_first_contacts(prescribed, supports);
+            self.record_first_contacts(prescribed, connectivity);
         }
         // Contact detection also updates the constrained conditions.
-        let contact = grid.is_some() && self.in_contact(supports, prescribed);
+        let contact = grid.is_some() && self.in_contact(connectivity, prescribed);
         self.history.grid = grid.filter(|_| !contact && self.settings.grid_reset.keeps(strain));
         self.history.equilibrium = None;
         if self.history.resets_grid() {
             self.history.rate.clear();
             self.particles.reference = None;
             if !self.settings.scheme.has_inertia() {
-                let touching = self.bodies_touch(supports);
+                let touching = self.bodies_touch(connectivity);
                 let last = LastEquilibrium::new(&self.loads, accounts.by_field.clone(), touching, field_positions);
                 self.history.equilibrium = Some(last);
             }
@@ -113,16 +113,16 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     }
 
     /// Records the prescribed conditions that hold bodies from the start, and the bodies that touch.
-    fn record_first_contacts(&mut self, prescribed: &[PrescribedDof], supports: &Supports<D>) {
+    fn record_first_contacts(&mut self, prescribed: &[PrescribedDof], connectivity: &Connectivity<D>) {
         self.history.constrained = prescribed.iter().map(|dof| dof.owner).collect();
         if self.settings.grid_reset != GridReset::EveryStep && self.bodies.len() > 1 {
             let at_start = self.particles.reference().position;
-            self.history.bonded = pairs(at_start, &self.particles.body, supports);
+            self.history.bonded = pairs(at_start, &self.particles.body, connectivity);
         }
     }
 
-    fn bodies_touch(&self, supports: &Supports<D>) -> bool {
-        self.bodies.len() > 1 && touch(&self.particles, supports)
+    fn bodies_touch(&self, connectivity: &Connectivity<D>) -> bool {
+        self.bodies.len() > 1 && touch(&self.particles, connectivity)
     }
 
     /// Whether a contact, a prescribed condition outside [`History::constrained`], has active nodes in this step.
@@ -132,32 +132,35 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
 
     /// Whether a body has reached a wall, or in load steps another body. With inertia, also whether a body still feels a wall or touches
     /// another body: without a grid reset, it would never leave.
-    fn in_contact(&mut self, supports: &Supports<D>, prescribed: &[PrescribedDof]) -> bool {
-        let reached = reached_conditions(&self.particles, &self.loads.prescribed, supports);
+    fn in_contact(&mut self, connectivity: &Connectivity<D>, prescribed: &[PrescribedDof]) -> bool {
+        let reached = reached_conditions(&self.particles, &self.loads.prescribed, connectivity);
         self.history.constrained.retain(|one| !reached.contains(one));
         if !reached.is_empty() {
             return true;
         }
         if self.settings.scheme.has_inertia() {
-            return self.feels_wall(prescribed) || self.bodies_touch(supports);
+            return self.feels_wall(prescribed) || self.bodies_touch(connectivity);
         }
-        self.bodies.len() > 1 && reached_body(&self.particles, &self.history.bonded, supports)
+        self.bodies.len() > 1 && reached_body(&self.particles, &self.history.bonded, connectivity)
     }
 
     /// The out-of-balance force R₀ on a new grid; empty with inertia and on the first grid. Also empty where a body has lost a condition or
     /// another body that held it: the reaction of a lost support must not act any longer.
     pub(super) fn out_of_balance(
         &self,
-        supports: &Supports<D>,
+        connectivity: &Connectivity<D>,
         nodal: &Nodal<D>,
         prescribed: &[PrescribedDof],
     ) -> Result<Pooled<Vector<f64, D>>, Inadmissible> {
         let Some(last) = self.history.equilibrium.as_ref().filter(|_| nodal.is_static()) else {
             return Ok(Pooled::default());
         };
-        if last.lost_support(supports, prescribed) || last.touching && !self.bodies_touch(supports) {
+        if last.lost_support(connectivity, prescribed) || last.touching && !self.bodies_touch(connectivity) {
             return Ok(Pooled::default());
         }
-        last.out_of_balance(self.equilibrium(supports, nodal, prescribed, Alphas::START, self.load()).step, prescribed)
+        last.out_of_balance(
+            self.equilibrium(connectivity, nodal, prescribed, Alphas::START, self.load()).step,
+            prescribed,
+        )
     }
 }

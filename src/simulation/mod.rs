@@ -32,7 +32,7 @@ use crate::material::{DISSIPATED, Law, Material, NonPositiveJacobian, first_piol
 use crate::mechanics::loads::{Loads, PrescribedDof};
 use crate::mechanics::path::Path;
 use crate::mechanics::schemes::Alphas;
-use crate::mechanics::sweep::{Fields, Points, Supports};
+use crate::mechanics::sweep::{Connectivity, Fields, Points};
 use crate::mechanics::symmetry::Unsymmetric;
 use crate::mechanics::transfer::Nodal;
 use crate::parallel::{self, PART};
@@ -94,9 +94,9 @@ pub struct Simulation<const D: usize, L = Material, A = Approximation> {
 /// holds it. A step that fails leaves no shape functions.
 #[derive(Debug, Default)]
 pub struct Workspace<const D: usize> {
-    supports: Option<Supports<D>>,
+    connectivity: Option<Connectivity<D>>,
     /// Whether the next step uses the shape functions unchanged, because the grid was not reset.
-    supports_are_valid: bool,
+    connectivity_is_valid: bool,
     pool: Pool,
 }
 
@@ -169,7 +169,7 @@ impl<const D: usize, L, A> Simulation<D, L, A> {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn rearrange(&mut self, order: &[u32]) {
-        self.workspace.supports = None;
+        self.workspace.connectivity = None;
         self.particles.rearrange(order);
         let last = self.history.equilibrium.iter_mut().map(|last| &mut last.loads);
         let loads = std::iter::once(&mut self.loads).chain(last);
@@ -346,9 +346,10 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     ) -> Result<(), StepError> {
         let points =
             Points { fields: Fields::of(&self.bodies, &self.particles.body), ..Points::at(&self.particles.position) };
-        let (supports, nodes) = Supports::rebuilt(None, &self.approximation, &self.grid, &points, &Pool::default())?;
+        let (connectivity, nodes) =
+            Connectivity::rebuilt(None, &self.approximation, &self.grid, &points, &Pool::default())?;
         let nodal: Vec<_> = nodes.positions(&self.grid).map(|(_, x)| velocity(&x)).collect();
-        self.particles.velocity = supports.values(&nodal).to_vec();
+        self.particles.velocity = connectivity.values(&nodal).to_vec();
         Ok(())
     }
 
@@ -384,19 +385,19 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         if !self.settings.scheme.has_inertia() {
             return Ok(());
         }
-        let supports = self.new_supports(None)?;
-        let prescribed = self.prescribed(supports.active());
-        let space = supports.space(prescribed.iter().map(PrescribedDof::place));
-        let mut nodal = Nodal::at_rest(&self.particles, &supports);
+        let connectivity = self.new_connectivity(None)?;
+        let prescribed = self.prescribed(connectivity.active());
+        let space = connectivity.space(prescribed.iter().map(PrescribedDof::place));
+        let mut nodal = Nodal::at_rest(&self.particles, &connectivity);
         if self.loads.damping.is_some() {
-            nodal.velocity = self.project(&supports)?.with_prescribed(&prescribed).extended(&space).velocity;
+            nodal.velocity = self.project(&connectivity)?.with_prescribed(&prescribed).extended(&space).velocity;
         }
         // Δφ = 0 and a_n = 0, so the inertia force is zero; damping acts on v_n.
-        let equilibrium = self.equilibrium(&supports, &nodal, &prescribed, Alphas::START, self.clock.time());
+        let equilibrium = self.equilibrium(&connectivity, &nodal, &prescribed, Alphas::START, self.clock.time());
         let unbalanced = equilibrium.residual::<f64>(&nodal.acceleration)?;
-        nodal.accelerate(&self.particles, &supports, &unbalanced);
+        nodal.accelerate(&self.particles, &connectivity, &unbalanced);
         let nodal = nodal.with_prescribed(&prescribed).extended(&space);
-        self.particles.acceleration = supports.values(&nodal.acceleration).to_vec();
+        self.particles.acceleration = connectivity.values(&nodal.acceleration).to_vec();
         Ok(())
     }
 }

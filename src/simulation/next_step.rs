@@ -6,7 +6,7 @@ use crate::material::{Law, Material};
 use crate::mechanics::loads::PrescribedDof;
 use crate::mechanics::residual::Equilibrium;
 use crate::mechanics::schemes::Alphas;
-use crate::mechanics::sweep::Supports;
+use crate::mechanics::sweep::Connectivity;
 use crate::mechanics::transfer::Nodal;
 use crate::space::Nodes;
 use crate::tensor::Vector;
@@ -29,7 +29,7 @@ use crate::tensor::Vector;
 pub struct NextStep<const D: usize, L = Material, A = Approximation> {
     /// A copy of the simulation.
     simulation: Simulation<D, L, A>,
-    supports: Supports<D>,
+    connectivity: Connectivity<D>,
     nodal: Nodal<D>,
     prescribed: Vec<PrescribedDof>,
     /// The coefficients of the time integrator.
@@ -46,20 +46,20 @@ impl<const D: usize, L: Law + Clone, A: ShapeFunction + Clone> Simulation<D, L, 
     pub fn next_step(&self) -> Result<NextStep<D, L, A>, StepError> {
         let mut simulation = Self { workspace: Workspace::default(), ..self.clone() };
         simulation.particles.make_room_for_internal(&simulation.bodies);
-        let supports = simulation.new_supports(None)?;
-        simulation.find_candidates(&supports);
-        let prescribed = self.prescribed(supports.active());
-        let nodal = simulation.nodal(&supports, &prescribed)?.with_prescribed(&prescribed);
-        let nodal = nodal.extended(&supports.space(prescribed.iter().map(PrescribedDof::place)));
+        let connectivity = simulation.new_connectivity(None)?;
+        simulation.find_candidates(&connectivity);
+        let prescribed = self.prescribed(connectivity.active());
+        let nodal = simulation.nodal(&connectivity, &prescribed)?.with_prescribed(&prescribed);
+        let nodal = nodal.extended(&connectivity.space(prescribed.iter().map(PrescribedDof::place)));
         let alphas = simulation.settings.scheme.balance(simulation.clock.step());
-        Ok(NextStep { simulation, supports, nodal, prescribed, alphas })
+        Ok(NextStep { simulation, connectivity, nodal, prescribed, alphas })
     }
 }
 
 impl<const D: usize, L: Law, A: ShapeFunction> NextStep<D, L, A> {
     /// The active nodes.
     pub fn nodes(&self) -> &Nodes {
-        self.supports.active()
+        self.connectivity.active()
     }
 
     /// The positions of the active nodes.
@@ -78,8 +78,8 @@ impl<const D: usize, L: Law, A: ShapeFunction> NextStep<D, L, A> {
     }
 
     /// The shape functions.
-    pub fn supports(&self) -> &Supports<D> {
-        &self.supports
+    pub fn connectivity(&self) -> &Connectivity<D> {
+        &self.connectivity
     }
 
     /// The same problem with other coefficients of the time integrator.
@@ -87,15 +87,15 @@ impl<const D: usize, L: Law, A: ShapeFunction> NextStep<D, L, A> {
         Self { alphas, ..self }
     }
 
-    /// The same problem with another implementation of the same shape functions, such as [`Supports::plain`].
-    pub fn with_supports(self, supports: Supports<D>) -> Self {
-        Self { supports, ..self }
+    /// The same problem with another implementation of the same shape functions, such as [`Connectivity::plain`].
+    pub fn with_connectivity(self, connectivity: Connectivity<D>) -> Self {
+        Self { connectivity, ..self }
     }
 
     /// The Δφ that Newton's method starts from.
     pub fn initial_guess(&self) -> Vec<Vector<f64, D>> {
         let mut dphi =
-            self.simulation.initial_guess(&self.supports, &self.nodal, self.simulation.clock.step()).to_vec();
+            self.simulation.initial_guess(&self.connectivity, &self.nodal, self.simulation.clock.step()).to_vec();
         self.prescribe(&mut dphi);
         dphi
     }
@@ -114,8 +114,8 @@ impl<const D: usize, L: Law, A: ShapeFunction> NextStep<D, L, A> {
 
     /// The equilibrium, as a function of φ, at the instant of force balance: the end of the step, except in generalised-α.
     pub fn equilibrium(&self) -> Equilibrium<'_, D, L> {
-        let Self { simulation, supports, nodal, prescribed, alphas } = self;
-        simulation.equilibrium(supports, nodal, prescribed, *alphas, simulation.load_of_balance())
+        let Self { simulation, connectivity, nodal, prescribed, alphas } = self;
+        simulation.equilibrium(connectivity, nodal, prescribed, *alphas, simulation.load_of_balance())
     }
 
     /// The instant of force balance, as a fraction θ of the step.

@@ -7,7 +7,7 @@ use crate::mechanics::extension::extension;
 use crate::mechanics::loads::{PrescribedDof, at_surface_points, prescribed_dofs};
 use crate::mechanics::residual::Equilibrium;
 use crate::mechanics::schemes::Alphas;
-use crate::mechanics::sweep::{Fields, Points, SupportError, Supports};
+use crate::mechanics::sweep::{Connectivity, ConnectivityError, Fields, Points};
 use crate::mechanics::terms;
 use crate::mechanics::transfer::{Nodal, Projection};
 use crate::solver::LinearError;
@@ -15,29 +15,32 @@ use crate::space::Nodes;
 
 impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// The shape functions of a step; those of the last step if the grid is not reset. The particles then lie in the order of the blocks.
-    pub(super) fn supports(&mut self) -> Result<Supports<D>, SupportError> {
+    pub(super) fn connectivity(&mut self) -> Result<Connectivity<D>, ConnectivityError> {
         let resets = self.history.resets_grid();
-        match self.workspace.supports.take() {
-            Some(supports) if !resets && self.workspace.supports_are_valid => Ok(supports.with_no_pass()),
+        match self.workspace.connectivity.take() {
+            Some(connectivity) if !resets && self.workspace.connectivity_is_valid => Ok(connectivity.with_no_pass()),
             spare => {
-                let mut supports = self.unaggregated(spare)?;
-                if let Some(order) = supports.block_order() {
+                let mut connectivity = self.unaggregated(spare)?;
+                if let Some(order) = connectivity.block_order() {
                     self.rearrange(&order);
-                    supports.rearrange();
+                    connectivity.rearrange();
                 }
                 // Sums over particles are made in the order of the blocks, as after a restart.
-                Ok(self.aggregated(supports))
+                Ok(self.aggregated(connectivity))
             }
         }
     }
 
     /// The shape functions in the reference configuration, in the memory of `spare`, which is no longer needed.
-    pub(crate) fn new_supports(&self, spare: Option<Supports<D>>) -> Result<Supports<D>, SupportError> {
+    pub(crate) fn new_connectivity(
+        &self,
+        spare: Option<Connectivity<D>>,
+    ) -> Result<Connectivity<D>, ConnectivityError> {
         Ok(self.aggregated(self.unaggregated(spare)?))
     }
 
-    /// [`Self::new_supports`] where every node is an unknown.
-    fn unaggregated(&self, spare: Option<Supports<D>>) -> Result<Supports<D>, SupportError> {
+    /// [`Self::new_connectivity`] where every node is an unknown.
+    fn unaggregated(&self, spare: Option<Connectivity<D>>) -> Result<Connectivity<D>, ConnectivityError> {
         let Self { particles, bodies, loads, approximation, grid, settings, workspace, .. } = self;
         let fields = Fields::of(bodies, &particles.body);
         let processes = settings.processes.clone();
@@ -47,29 +50,29 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             let at_surface = approximation.separable().map_or(AtSurface::Own, Separable::at_surface);
             points = at_surface_points(points, particles, loads, grid, at_surface);
         }
-        let (supports, _) = Supports::rebuilt(spare, approximation, grid, &points, &workspace.pool)?;
-        Ok(supports.with_gpu(settings.gpu.clone()))
+        let (connectivity, _) = Connectivity::rebuilt(spare, approximation, grid, &points, &workspace.pool)?;
+        Ok(connectivity.with_gpu(settings.gpu.clone()))
     }
 
     /// The shape functions with [`aggregation`](crate::aggregation), if the settings ask for it: nodes with little support from a body then
     /// follow other nodes.
-    fn aggregated(&self, supports: Supports<D>) -> Supports<D> {
+    fn aggregated(&self, connectivity: Connectivity<D>) -> Connectivity<D> {
         if !self.settings.aggregation {
-            return supports;
+            return connectivity;
         }
-        let extension = extension(self.approximation.pieces(), &self.particles, &supports);
-        supports.with_extension(extension)
+        let extension = extension(self.approximation.pieces(), &self.particles, &connectivity);
+        connectivity.with_extension(extension)
     }
 
     /// The degrees of freedom prescribed in the next step.
     ///
     /// ```
-    /// use bfree::mechanics::sweep::Supports;
+    /// use bfree::mechanics::sweep::Connectivity;
     ///
     /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
     /// let mut simulation = scene.build::<2>("scenes".as_ref())?;
     /// let held = |of: &bfree::simulation::Simulation<2>| -> Result<_, Box<dyn std::error::Error>> {
-    ///     let (_, nodes) = Supports::new(&of.approximation, &of.grid, &of.particles.position)?;
+    ///     let (_, nodes) = Connectivity::new(&of.approximation, &of.grid, &of.particles.position)?;
     ///     Ok(of.prescribed(&nodes))
     /// };
     /// // Only active nodes count: near the right wall, the disc sees nodes of it, and they may slide but not leave.
@@ -86,14 +89,20 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     }
 
     /// The nodal state at t_n: projected from the particles after a grid reset, otherwise that of the last step.
-    pub(super) fn nodal(&self, supports: &Supports<D>, prescribed: &[PrescribedDof]) -> Result<Nodal<D>, StepError> {
-        let nodes = supports.nodes();
+    pub(super) fn nodal(
+        &self,
+        connectivity: &Connectivity<D>,
+        prescribed: &[PrescribedDof],
+    ) -> Result<Nodal<D>, StepError> {
+        let nodes = connectivity.nodes();
         match &self.history.grid {
             None => {
-                let nodal = self.project(supports)?;
-                Ok(Nodal { out_of_balance: self.out_of_balance(supports, &nodal, prescribed)?, ..nodal })
+                let nodal = self.project(connectivity)?;
+                Ok(Nodal { out_of_balance: self.out_of_balance(connectivity, &nodal, prescribed)?, ..nodal })
             }
-            Some(grid) if grid.motion.len() == nodes => Ok(Nodal { mass: self.masses(supports).mass, ..grid.clone() }),
+            Some(grid) if grid.motion.len() == nodes => {
+                Ok(Nodal { mass: self.masses(connectivity).mass, ..grid.clone() })
+            }
             Some(grid) => Err(StepError::OtherGrid { stored: grid.motion.len(), nodes }),
         }
     }
@@ -102,35 +111,35 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     ///
     /// # Errors
     /// Particle velocities so large that the projection overflows.
-    pub(crate) fn project(&self, supports: &Supports<D>) -> Result<Nodal<D>, LinearError> {
+    pub(crate) fn project(&self, connectivity: &Connectivity<D>) -> Result<Nodal<D>, LinearError> {
         if self.settings.scheme.has_inertia() {
             return match self.settings.projection {
-                Projection::Mass => Nodal::project(&self.particles, supports, self.settings.lumping),
-                Projection::Affine => Ok(Nodal::fit(&self.particles, supports)),
+                Projection::Mass => Nodal::project(&self.particles, connectivity, self.settings.lumping),
+                Projection::Affine => Ok(Nodal::fit(&self.particles, connectivity)),
             };
         }
-        Ok(self.masses(supports))
+        Ok(self.masses(connectivity))
     }
 
     /// The nodal mass, if inertia or gravity needs it.
-    pub(super) fn masses(&self, supports: &Supports<D>) -> Nodal<D> {
+    pub(super) fn masses(&self, connectivity: &Connectivity<D>) -> Nodal<D> {
         let weighs = self.settings.scheme.has_inertia() || self.loads.gravity.is_some();
-        if weighs { Nodal::mass_alone(&self.particles, supports) } else { Nodal::default() }
+        if weighs { Nodal::mass_alone(&self.particles, connectivity) } else { Nodal::default() }
     }
 
     /// The equilibrium problem at time `t`, with given shape functions in the
     /// [reference configuration](crate::mechanics::reference).
     ///
     /// ```
-    /// use bfree::mechanics::{sweep::Supports, transfer::Nodal};
+    /// use bfree::mechanics::{sweep::Connectivity, transfer::Nodal};
     ///
     /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
     /// let simulation = scene.build::<2>("scenes".as_ref())?;
     /// let (particles, grid, dt) = (&simulation.particles, &simulation.grid, simulation.clock.step());
-    /// let (supports, _) = Supports::new(&simulation.approximation, grid, &particles.position)?;
-    /// let nodal = Nodal::project(particles, &supports, simulation.settings.lumping)?;
+    /// let (connectivity, _) = Connectivity::new(&simulation.approximation, grid, &particles.position)?;
+    /// let nodal = Nodal::project(particles, &connectivity, simulation.settings.lumping)?;
     /// let alphas = simulation.settings.scheme.end(dt);
-    /// let equilibrium = simulation.equilibrium(&supports, &nodal, &[], alphas, dt);
+    /// let equilibrium = simulation.equilibrium(&connectivity, &nodal, &[], alphas, dt);
     /// // A body in free flight is in equilibrium at Δφ = Δt v.
     /// let dphi: Vec<_> = nodal.velocity.iter().map(|v| v * dt).collect();
     /// let residual = equilibrium.residual(&dphi)?;
@@ -139,7 +148,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// ```
     pub fn equilibrium<'a>(
         &'a self,
-        supports: &'a Supports<D>,
+        connectivity: &'a Connectivity<D>,
         nodal: &'a Nodal<D>,
         prescribed: &'a [PrescribedDof],
         alphas: Alphas,
@@ -151,7 +160,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         // At t_n, too, laws need the length of a step.
         let dt = if alphas.dt > 0.0 { alphas.dt } else { self.clock.step() };
         Equilibrium::new(
-            terms::Step { particles, bodies, loads, supports, nodal, alphas, lumping, time: t, dt, poses: None },
+            terms::Step { particles, bodies, loads, connectivity, nodal, alphas, lumping, time: t, dt, poses: None },
             prescribed,
         )
     }

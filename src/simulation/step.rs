@@ -6,7 +6,7 @@ use super::{AdvanceError, FailedAttempt, Simulation, StepError, StepReport, comp
 use crate::approximation::ShapeFunction;
 use crate::material::Law;
 use crate::mechanics::loads::PrescribedDof;
-use crate::mechanics::sweep::Supports;
+use crate::mechanics::sweep::Connectivity;
 use crate::mechanics::transfer::{Nodal, Update};
 use crate::mechanics::trial::Trial;
 use crate::phases::Phase;
@@ -42,21 +42,21 @@ impl<const D: usize, L: Law + 'static, A: ShapeFunction + 'static> Simulation<D,
         self.particles.make_room_for_internal(&self.bodies);
         let (dt, scheme, watch) = (self.clock.step(), self.settings.scheme.clone(), &mut spent.watch);
 
-        let supports = self.supports()?;
-        self.find_candidates(&supports);
-        let nodes = supports.active().clone();
+        let connectivity = self.connectivity()?;
+        self.find_candidates(&connectivity);
+        let nodes = connectivity.active().clone();
         let prescribed = self.prescribed(&nodes);
-        watch.lap(Phase::ShapeFunctions, supports.passes());
+        watch.lap(Phase::ShapeFunctions, connectivity.passes());
 
-        let projected = self.nodal(&supports, &prescribed)?;
+        let projected = self.nodal(&connectivity, &prescribed)?;
         spent.projection_iterations = projected.iterations;
-        let space = supports.space(prescribed.iter().map(PrescribedDof::place));
+        let space = connectivity.space(prescribed.iter().map(PrescribedDof::place));
         let nodal = projected.with_prescribed(&prescribed).extended(&space);
-        watch.lap(Phase::Projection, supports.passes());
+        watch.lap(Phase::Projection, connectivity.passes());
 
         let Balance { equilibrium, phi, dilatation: [before, after], newton, load, cosine } =
-            self.balance(&supports, &nodal, &prescribed)?;
-        watch.lap(Phase::Newton, supports.passes());
+            self.balance(&connectivity, &nodal, &prescribed)?;
+        watch.lap(Phase::Newton, connectivity.passes());
         self.check_tangent(&equilibrium, Trial { phi: &phi, dilatation: &after })?;
         // Forces are in balance at t_n + θ Δt. The motion is extrapolated to t_{n+1}.
         let (mut dphi, theta) = (phi, scheme.instant());
@@ -67,19 +67,19 @@ impl<const D: usize, L: Law + 'static, A: ShapeFunction + 'static> Simulation<D,
 
         let update = Update::new(&scheme.end(dt), &projected, &nodal, &prescribed, self.settings.wall_update, &dphi);
         let mut update = update.with_dilatation(after).extended(&nodal, &space);
-        let error = self.local_error(&update, &supports, dt, &newton)?;
-        self.smooth_and_check(&mut update, &supports, &nodal)?;
+        let error = self.local_error(&update, &connectivity, dt, &newton)?;
+        self.smooth_and_check(&mut update, &connectivity, &nodal)?;
         let accounts = self.accounts(&equilibrium, &dphi, &before, &update)?;
 
         // Nothing fails from here on.
         let (reset, feels_wall) = (self.history.resets_grid(), self.feels_wall(&prescribed));
-        let yielding = self.accept(update, &projected, &prescribed, &accounts, &supports);
-        let shared_nodes = self.shared_nodes(&supports);
+        let yielding = self.accept(update, &projected, &prescribed, &accounts, &connectivity);
+        let shared_nodes = self.shared_nodes(&connectivity);
         if scheme.follows_path() {
             self.path = self.path.after(load, &dphi, dt);
         }
-        let passes = supports.passes();
-        self.store_supports(supports);
+        let passes = connectivity.passes();
+        self.store_connectivity(connectivity);
         watch.lap(Phase::Update, passes);
         self.clock.advance_and_grow_if(self.may_grow(error, &newton));
         Ok(StepReport {
@@ -108,16 +108,16 @@ impl<const D: usize, L: Law + 'static, A: ShapeFunction + 'static> Simulation<D,
     fn smooth_and_check(
         &self,
         update: &mut Update<'_, D>,
-        supports: &Supports<D>,
+        connectivity: &Connectivity<D>,
         nodal: &Nodal<D>,
     ) -> Result<(), StepError> {
         if let Some(smoothing) = &self.settings.smoothing {
-            update.smooth(smoothing, &self.particles, supports, &nodal.mass, self.clock.step());
+            update.smooth(smoothing, &self.particles, connectivity, &nodal.mass, self.clock.step());
         }
-        if let Some((particle, position)) = update.leaving(&self.particles, supports, &self.grid) {
+        if let Some((particle, position)) = update.leaving(&self.particles, connectivity, &self.grid) {
             return Err(StepError::LeftGrid { particle, position: position.iter().copied().collect() });
         }
-        match update.remember(&self.particles, &self.bodies, supports, self.clock.step()) {
+        match update.remember(&self.particles, &self.bodies, connectivity, self.clock.step()) {
             None => Ok(()),
             Some(particle) => Err(StepError::Undefined { particle }),
         }
@@ -125,9 +125,9 @@ impl<const D: usize, L: Law + 'static, A: ShapeFunction + 'static> Simulation<D,
 
     /// Stores the shape functions for the next step, or their memory alone if it cannot use them. Refines surfaces that have stretched, because
     /// a new grid is the time for it.
-    fn store_supports(&mut self, supports: Supports<D>) {
-        self.workspace.supports_are_valid = !self.history.resets_grid();
-        self.workspace.supports = Some(supports);
+    fn store_connectivity(&mut self, connectivity: Connectivity<D>) {
+        self.workspace.connectivity_is_valid = !self.history.resets_grid();
+        self.workspace.connectivity = Some(connectivity);
         self.refine_surfaces(self.load() + self.clock.step());
     }
 
@@ -144,12 +144,12 @@ impl<const D: usize, L: Law + 'static, A: ShapeFunction + 'static> Simulation<D,
     fn local_error(
         &self,
         update: &Update<'_, D>,
-        supports: &Supports<D>,
+        connectivity: &Connectivity<D>,
         dt: f64,
         newton: &NewtonReport,
     ) -> Result<Option<f64>, StepError> {
         let Some(tolerance) = self.settings.error_tolerance else { return Ok(None) };
-        let error = update.local_error(&self.particles, supports, self.settings.scheme.error_constant(), dt);
+        let error = update.local_error(&self.particles, connectivity, self.settings.scheme.error_constant(), dt);
         let error = error / self.grid.spacing;
         // NaN is not a small error.
         if (error.is_nan() || error > tolerance) && self.clock.can_halve() {

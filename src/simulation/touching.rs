@@ -3,7 +3,7 @@
 use super::Simulation;
 use crate::approximation::ShapeFunction;
 use crate::material::{Law, p_wave_modulus};
-use crate::mechanics::sweep::Supports;
+use crate::mechanics::sweep::Connectivity;
 use crate::tensor::Vector;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -40,14 +40,14 @@ type Interface = [BTreeSet<usize>; 2];
 
 impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// All pairs of bodies that share nodes.
-    pub(crate) fn shared_nodes(&self, supports: &Supports<D>) -> Vec<SharedNodes> {
-        let interfaces = self.interfaces(supports).into_iter();
+    pub(crate) fn shared_nodes(&self, connectivity: &Connectivity<D>) -> Vec<SharedNodes> {
+        let interfaces = self.interfaces(connectivity).into_iter();
         let of = |(bodies, sides)| SharedNodes { bodies, gap: self.gap(&sides), tension: self.tension(bodies, &sides) };
         interfaces.map(of).collect()
     }
 
     /// The particles that contribute to nodes of another body, by pairs of bodies.
-    fn interfaces(&self, supports: &Supports<D>) -> BTreeMap<[u32; 2], Interface> {
+    fn interfaces(&self, connectivity: &Connectivity<D>) -> BTreeMap<[u32; 2], Interface> {
         let mut found: BTreeMap<[u32; 2], Interface> = BTreeMap::new();
         // Bodies of different fields share no nodes.
         let fields: BTreeSet<u32> = self.bodies.iter().map(|body| body.field).collect();
@@ -56,9 +56,9 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         }
         let particles = &self.particles;
         let solid = || (0..particles.len()).filter(|&p| particles.is_solid(p));
-        let nodes = |p: usize| supports.of(p).filter(|(_, n, _)| n.abs() > NO_PART).map(|(node, ..)| node);
+        let nodes = |p: usize| connectivity.of(p).filter(|(_, n, _)| n.abs() > NO_PART).map(|(node, ..)| node);
         // The lowest and the highest body at each node.
-        let mut span = vec![[u32::MAX, 0]; supports.nodes()];
+        let mut span = vec![[u32::MAX, 0]; connectivity.nodes()];
         for p in solid() {
             let own = particles.body[p];
             nodes(p).for_each(|node| span[node] = [span[node][0].min(own), span[node][1].max(own)]);
@@ -142,7 +142,7 @@ mod tests {
         let scene = crate::scene::read_file("scenes/collision.json".as_ref(), &[])?;
         let mut simulation = scene.build::<2>("scenes".as_ref())?;
         let shared = |of: &Simulation<2>| -> Result<_, Box<dyn std::error::Error>> {
-            Ok(of.shared_nodes(&Supports::new(&of.approximation, &of.grid, &of.particles.position)?.0))
+            Ok(of.shared_nodes(&Connectivity::new(&of.approximation, &of.grid, &of.particles.position)?.0))
         };
         assert!(shared(&simulation)?.is_empty());
         let particles = &mut simulation.particles;

@@ -37,15 +37,15 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         dilatation: &[f64],
         update: &Update<'_, D>,
     ) -> Result<Accounts<D>, StepError> {
-        let (terms::Step { supports, nodal, .. }, phi) = (balanced.step, update.motion());
+        let (terms::Step { connectivity, nodal, .. }, phi) = (balanced.step, update.motion());
         let (t, dt) = (self.load(), self.clock.step());
-        let before = supports.pool().collect(nodal.moved(supports.nodes()));
+        let before = connectivity.pool().collect(nodal.moved(connectivity.nodes()));
         let free = self.free_after(&balanced.step, &before, phi)?;
         let poses = self.poses_after(&free, t + dt);
         let mut end = balanced;
         let after;
         if self.settings.scheme.instant() < 1.0 {
-            let ends = self.equilibrium(supports, nodal, balanced.prescribed, self.settings.scheme.end(dt), t + dt);
+            let ends = self.equilibrium(connectivity, nodal, balanced.prescribed, self.settings.scheme.end(dt), t + dt);
             after = Equilibrium::new(terms::Step { poses: Some(&poses), ..ends.step }, ends.prescribed);
             // The stress at the end is evaluated here for the first time, and fails where det F ≤ 0.
             after.forces(Role::Stores, phi)?;
@@ -53,12 +53,12 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         }
         let is_mean = balanced.step.alphas.discrete_gradient;
         let (by_field, mut work) = self.reactions(end, update, is_mean)?;
-        let reactions = by_field.chunks(supports.field_count() as usize).map(Reaction::sum).collect();
+        let reactions = by_field.chunks(connectivity.field_count() as usize).map(Reaction::sum).collect();
         // At t_n: a = a_n and Δφ = 0.
-        let start = self.equilibrium(supports, nodal, end.prescribed, Alphas::START, t);
+        let start = self.equilibrium(connectivity, nodal, end.prescribed, Alphas::START, t);
         let middle = if is_mean { halfway(&before, phi) } else { Vec::new() };
         if end.prescribed.iter().any(|dof| dof.moving) {
-            let mut residual: Pooled<Vector<f64, D>> = supports.field();
+            let mut residual: Pooled<Vector<f64, D>> = connectivity.field();
             let share = if is_mean { 1.0 } else { 0.5 };
             match is_mean {
                 true => balanced.residual_into(Trial::motion(&middle), &mut residual)?,
@@ -87,21 +87,21 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         update: &Update<'_, D>,
         is_mean: bool,
     ) -> Result<(Vec<Reaction<D>>, f64), StepError> {
-        let (terms::Step { supports, .. }, phi, dt) = (end.step, update.motion(), self.clock.step());
+        let (terms::Step { connectivity, .. }, phi, dt) = (end.step, update.motion(), self.clock.step());
         let conditions = &self.loads.prescribed;
-        let fields = supports.field_count() as usize;
+        let fields = connectivity.field_count() as usize;
         let mut reactions = vec![Reaction::NONE; conditions.len() * fields];
         let mut work = 0.0;
         if !end.prescribed.is_empty() {
-            let mut residual: Pooled<Vector<f64, D>> = supports.field();
+            let mut residual: Pooled<Vector<f64, D>> = connectivity.field();
             end.residual_into(update.state(), &mut residual)?;
             for (dof, impulse) in end.prescribed.iter().zip(update.impulses()) {
                 let (reaction, blow) = (residual[dof.node][dof.component], impulse / dt);
                 mutant!("step: reactions and work lack the blow of a wall": blow = 0.0);
-                let of_field = &mut reactions[dof.owner * fields + supports.field_of_node(dof.node) as usize];
+                let of_field = &mut reactions[dof.owner * fields + connectivity.field_of_node(dof.node) as usize];
                 of_field.force[dof.component] += reaction + blow;
                 if let Some(rotation) = conditions[dof.owner].rotation() {
-                    let x = self.grid.position(self.grid.index(supports.active().id(dof.node))) + phi[dof.node];
+                    let x = self.grid.position(self.grid.index(connectivity.active().id(dof.node))) + phi[dof.node];
                     of_field.torque += rotation.moment(&x, dof.component, reaction + blow);
                 }
                 work += (if is_mean { blow } else { 0.5 * reaction + blow }) * dof.step.increment;

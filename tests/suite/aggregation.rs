@@ -116,7 +116,7 @@ fn the_tangent_is_the_derivative_of_the_aggregated_residual() -> Result<(), Fail
         let simulation = scene::<2>(name, &overrides)?;
         let coming = simulation.next_step()?;
         let equilibrium = coming.equilibrium();
-        let followers = equilibrium.step.supports.extension().map_or(0, |extension| extension.len());
+        let followers = equilibrium.step.connectivity.extension().map_or(0, |extension| extension.len());
         assert!(followers > 0, "{name}: no node follows");
         let count = coming.nodes().len();
         let dphi: Vec<_> = direction::<2>(count, 1).iter().map(|x| x * (1e-3 * simulation.grid.spacing)).collect();

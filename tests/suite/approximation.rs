@@ -5,7 +5,7 @@ use bfree::approximation::{
     Separable, ShapeFunction, Support, Validate,
 };
 use bfree::grid::{Axis, Grid};
-use bfree::mechanics::sweep::Supports;
+use bfree::mechanics::sweep::Connectivity;
 use bfree::tensor::Vector;
 use proptest::prelude::*;
 
@@ -127,8 +127,8 @@ fn round_off_does_not_decide_which_nodes_are_active() -> Result<(), Box<dyn std:
                 let x = origin + (4.0 + place) * grid.spacing;
                 let count = |by: f64| -> Result<usize, Box<dyn std::error::Error>> {
                     let positions = [Vector::from([x + by * x.abs().max(1.0) * f64::EPSILON])];
-                    let (supports, nodes) = Supports::new(&family, &grid, &positions)?;
-                    assert!(supports.of(0).all(|(_, n, _)| n.abs() > 1e-3), "{family:?}, {origin}, {place}, {by}");
+                    let (connectivity, nodes) = Connectivity::new(&family, &grid, &positions)?;
+                    assert!(connectivity.of(0).all(|(_, n, _)| n.abs() > 1e-3), "{family:?}, {origin}, {place}, {by}");
                     assert_eq!(support(&family, &grid, &positions[0])?.nodes.len(), nodes.len());
                     Ok(nodes.len())
                 };
@@ -298,9 +298,9 @@ fn a_family_that_lists_more_nodes_than_it_says_is_refused() {
     let grid = Grid { origin: Vector::zeros(), spacing: H, cells: [8, 8] };
     // Next to the walls there are at most three nodes along each axis.
     let positions = [[0.2, 0.3], [0.3, 0.2], [2.1, 2.2], [2.2, 2.1]].map(Vector::from);
-    for supports in [Supports::new, Supports::plain] {
-        assert!(supports(&Understated, &grid, &positions[..2]).is_ok());
-        let error = supports(&Understated, &grid, &positions).map(|_| ()).unwrap_err();
+    for connectivity in [Connectivity::new, Connectivity::plain] {
+        assert!(connectivity(&Understated, &grid, &positions[..2]).is_ok());
+        let error = connectivity(&Understated, &grid, &positions).map(|_| ()).unwrap_err();
         assert_eq!((error.particle, &error.source), (2, &ApproximationError::TooManyNodes { listed: 4, allowed: 3 }));
         assert!(error.source.to_string().contains("4 nodes") && error.source.to_string().contains("reach 3"));
     }

@@ -6,7 +6,7 @@ use bfree::clock::Clock;
 use bfree::grid::Grid;
 use bfree::material::{Lame, Material, NeoHookean};
 use bfree::mechanics::loads::{Curve, Gravity, Loads, Motion, Prescribed, Rayleigh, Selection};
-use bfree::mechanics::sweep::Supports;
+use bfree::mechanics::sweep::Connectivity;
 use bfree::mechanics::transfer::Nodal;
 use bfree::particles::Particles;
 use bfree::simulation::{Settings, Simulation};
@@ -215,7 +215,8 @@ fn a_body_that_turns_as_a_whole_is_not_damped_by_its_stiffness() -> Result<(), F
     simulation.particles.displacement_gradient.fill(Tensor::<f64, 2>::new(0.2, 0.3, -0.1, -0.15));
     simulation.loads.damping = Some(Rayleigh { mass: 0.0, stiffness: 0.5 });
     let dt = simulation.clock.step();
-    let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &simulation.particles.position)?;
+    let (connectivity, nodes) =
+        Connectivity::new(&simulation.approximation, &simulation.grid, &simulation.particles.position)?;
     let positions: Vec<_> = nodes.positions(&simulation.grid).map(|(_, x)| x).collect();
     // The body has turned by this angle on a grid that was not reset since.
     for angle in [0.0_f64, 1.0] {
@@ -225,13 +226,14 @@ fn a_body_that_turns_as_a_whole_is_not_damped_by_its_stiffness() -> Result<(), F
             Vector::from([cos * arm[0] - sin * arm[1], sin * arm[0] + cos * arm[1]])
         };
         let forces = |velocity: &dyn Fn(&Vector<f64, 2>) -> Vector<f64, 2>| -> Result<_, Failure> {
-            let mut nodal = Nodal::at_rest(&simulation.particles, &supports);
+            let mut nodal = Nodal::at_rest(&simulation.particles, &connectivity);
             nodal.motion =
                 positions.iter().map(|x| turned(x) - (x - Vector::from([2.5, 2.5]))).collect::<Vec<_>>().into();
             nodal.velocity.iter_mut().zip(&positions).for_each(|(v, x)| *v = velocity(&turned(x)));
             // v_{n+1} = v_n, for the real part of the dual numbers too.
             let phi: Vec<_> = nodal.motion.iter().zip(&*nodal.velocity).map(|(motion, v)| motion + v * dt).collect();
-            let equilibrium = simulation.equilibrium(&supports, &nodal, &[], simulation.settings.scheme.end(dt), dt);
+            let equilibrium =
+                simulation.equilibrium(&connectivity, &nodal, &[], simulation.settings.scheme.end(dt), dt);
             let pieces = equilibrium.terms.pieces();
             let piece = pieces.iter().find(|piece| piece.name == "damping").ok_or("no damping")?;
             let force = equilibrium.residual_of::<f64>(*piece, &phi)?;

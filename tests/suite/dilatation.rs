@@ -2,7 +2,7 @@
 
 use crate::support::{Failure, advance, in_threads, restored, run_to, scene};
 use bfree::mechanics::schemes::Alphas;
-use bfree::mechanics::sweep::Supports;
+use bfree::mechanics::sweep::Connectivity;
 use bfree::mechanics::transfer::{Nodal, Update, WallUpdate};
 use bfree::plan::Plan;
 use bfree::simulation::Simulation;
@@ -41,11 +41,11 @@ fn the_mean_of_a_uniform_motion_is_what_every_particle_does() -> Result<(), Fail
         let h = Tensor::<f64, 2>::new(h[0], h[1], h[2], h[3]);
         let mut energies = Vec::new();
         for simulation in [&mut averaged, &mut pointwise] {
-            let (supports, nodes) =
-                Supports::new(&simulation.approximation, &simulation.grid, &simulation.particles.position)?;
+            let (connectivity, nodes) =
+                Connectivity::new(&simulation.approximation, &simulation.grid, &simulation.particles.position)?;
             let dphi: Vec<_> = nodes.positions(&simulation.grid).map(|(_, x)| h * x).collect();
             let nodal = Nodal::default();
-            let equilibrium = simulation.equilibrium(&supports, &nodal, &[], Alphas::START, 0.0);
+            let equilibrium = simulation.equilibrium(&connectivity, &nodal, &[], Alphas::START, 0.0);
             let (energy, _) = equilibrium.potential::<f64>(&dphi).ok_or("a potential")??;
             let (at_rest, _) =
                 equilibrium.potential::<f64>(&vec![Vector::zeros(); nodes.len()]).ok_or("a potential")??;
@@ -54,7 +54,7 @@ fn the_mean_of_a_uniform_motion_is_what_every_particle_does() -> Result<(), Fail
             energies.push(energy);
             let update = Update::new(&Alphas::START, &nodal, &nodal, &[], WallUpdate::Literal, &dphi);
             let mut particles = simulation.particles.clone();
-            update.commit(&mut particles, &simulation.bodies, &supports, 1.0);
+            update.commit(&mut particles, &simulation.bodies, &connectivity, 1.0);
             simulation.particles = particles;
         }
         assert!((energies[0] / energies[1] - 1.0).abs() < 1e-11, "{energies:?}");
@@ -81,9 +81,9 @@ fn what_is_remembered_is_that_of_when_the_grid_was_new() -> Result<(), Failure> 
     assert!((a / b - 1.0).abs() < 1e-8, "{a} {b}");
     let mut renewed = membrane(0.49, 6.0, 4, &[MEAN, LINEAR, r#"grid.reset="every_step""#])?;
     advance(&mut renewed, 2)?;
-    let (supports, nodes) = Supports::new(&renewed.approximation, &renewed.grid, &renewed.particles.position)?;
+    let (connectivity, nodes) = Connectivity::new(&renewed.approximation, &renewed.grid, &renewed.particles.position)?;
     let nodal = Nodal::default();
-    let equilibrium = renewed.equilibrium(&supports, &nodal, &[], Alphas::START, 0.0);
+    let equilibrium = renewed.equilibrium(&connectivity, &nodal, &[], Alphas::START, 0.0);
     let (energy, _) = equilibrium.potential::<f64>(&vec![Vector::zeros(); nodes.len()]).ok_or("a potential")??;
     assert!((energy / renewed.strain_energy() - 1.0).abs() < 1e-11, "{energy} {}", renewed.strain_energy());
     // θ differs from J.

@@ -9,7 +9,7 @@ use bfree::mechanics::loads::ForceField;
 use bfree::mechanics::loads::{Curve, Gravity, Loads, PrescribedDof, Pressing, SurfaceLoad, SurfacePoint};
 use bfree::mechanics::residual::{Equilibrium, Inadmissible};
 use bfree::mechanics::schemes::Newmark;
-use bfree::mechanics::sweep::Supports;
+use bfree::mechanics::sweep::Connectivity;
 use bfree::mechanics::terms::{Piece, Step};
 use bfree::mechanics::transfer::Nodal;
 use bfree::particles::{Body, Particles};
@@ -109,7 +109,7 @@ struct Cloud<const D: usize> {
     particles: Particles<D>,
     bodies: Vec<Body<Faulty>>,
     loads: Loads<D>,
-    supports: Supports<D>,
+    connectivity: Connectivity<D>,
     nodal: Nodal<D>,
 }
 
@@ -128,10 +128,10 @@ fn cloud<const D: usize>(stress: f64, fault: Fault, closed: bool) -> Result<Clou
         particles.displacement_gradient[p] = Tensor::from_fn(|i, k| 0.2 * number(9 + D * i + k));
     }
     let grid = Grid { origin: Vector::zeros(), spacing: 1.0, cells: [3; D] };
-    let (supports, _) = Supports::new(&Approximation::from(Linear), &grid, &particles.position)?;
-    let nodal = Nodal::project(&particles, &supports, 1.0)?;
+    let (connectivity, _) = Connectivity::new(&Approximation::from(Linear), &grid, &particles.position)?;
+    let nodal = Nodal::project(&particles, &connectivity, 1.0)?;
     let bodies = vec![body(Fault::Nothing), body(fault)];
-    Ok(Cloud { particles, bodies, loads: Loads::default(), supports, nodal })
+    Ok(Cloud { particles, bodies, loads: Loads::default(), connectivity, nodal })
 }
 
 fn truthful<const D: usize>(stress: f64) -> Result<Cloud<D>, Failure> {
@@ -150,10 +150,10 @@ impl<const D: usize> Cloud<D> {
     }
 
     fn step(&self, lumping: f64) -> Step<'_, D, Faulty> {
-        let Self { particles, bodies, loads, supports, nodal } = self;
+        let Self { particles, bodies, loads, connectivity, nodal } = self;
         let dt = 0.5;
         let alphas = Newmark::default().alphas(dt);
-        Step { particles, bodies, loads, supports, nodal, alphas, lumping, time: 0.0, dt, poses: None }
+        Step { particles, bodies, loads, connectivity, nodal, alphas, lumping, time: 0.0, dt, poses: None }
     }
 
     fn equilibrium<'a>(&'a self, lumping: f64, prescribed: &'a [PrescribedDof]) -> Equilibrium<'a, D, Faulty> {
@@ -232,7 +232,7 @@ fn a_wrong_law_is_found<const D: usize>(stress: f64) -> Result<(), Failure> {
         };
         let found = mismatch(equilibrium.check_tangent(&dphi, &u))?;
         assert_eq!(found.compared, first, "{case}");
-        let seen = |p: usize| cloud.supports.of(p).any(|(node, _, _)| node == found.node);
+        let seen = |p: usize| cloud.connectivity.of(p).any(|(node, _, _)| node == found.node);
         assert!((SECOND..12).any(seen) && found.axis < D, "{case}: {found}");
         assert!((found.analytic - found.dual).abs() > 1e3 * found.bound * found.scale, "{case}: {found}");
     }
@@ -378,7 +378,7 @@ fn a_pressure_acts_on_flat_particles<const D: usize>() -> Result<(), Failure> {
     };
     checked(&u)?;
     let blocks = tangent.diagonal_blocks();
-    for ((node, ..), k) in cloud.supports.of(3).flat_map(|of_node| (0..D).map(move |k| (of_node, k))) {
+    for ((node, ..), k) in cloud.connectivity.of(3).flat_map(|of_node| (0..D).map(move |k| (of_node, k))) {
         let mut unit = vec![Vector::zeros(); u.len()];
         unit[node][k] = 1.0;
         let column = checked(&unit)?[node];

@@ -7,7 +7,7 @@ use bfree::material::{Lame, Law, Material, NonPositiveJacobian};
 use bfree::mechanics::loads::Loads;
 use bfree::mechanics::residual::{Equilibrium, Inadmissible, compose};
 use bfree::mechanics::schemes::{Alphas, Newmark};
-use bfree::mechanics::sweep::Supports;
+use bfree::mechanics::sweep::Connectivity;
 use bfree::mechanics::terms::Step;
 use bfree::mechanics::transfer::Nodal;
 use bfree::particles::{Body, Particles};
@@ -68,18 +68,18 @@ struct Results<const D: usize> {
 fn results<const D: usize, L: Law>(
     particles: &Particles<D>,
     bodies: &[Body<L>],
-    supports: &Supports<D>,
+    connectivity: &Connectivity<D>,
     dphi: &[Vector<f64, D>],
     u: &[Vector<f64, D>],
     divides: bool,
 ) -> Result<Results<D>, Failure> {
-    let (nodal, loads) = (Nodal::project(particles, supports, LUMPING)?, Loads::default());
+    let (nodal, loads) = (Nodal::project(particles, connectivity, LUMPING)?, Loads::default());
     let (alphas, lumping) = (alphas(), LUMPING);
     let step = Step {
         particles,
         bodies,
         loads: &loads,
-        supports,
+        connectivity,
         nodal: &nodal,
         alphas,
         lumping,
@@ -105,10 +105,10 @@ fn results<const D: usize, L: Law>(
 fn by_formulas<const D: usize>(
     particles: &Particles<D>,
     bodies: &[Body<Watched>],
-    supports: &Supports<D>,
+    connectivity: &Connectivity<D>,
     dphi: &[Vector<f64, D>],
 ) -> Result<Vec<Vector<f64, D>>, Failure> {
-    let (nodal, alphas) = (Nodal::project(particles, supports, LUMPING)?, alphas());
+    let (nodal, alphas) = (Nodal::project(particles, connectivity, LUMPING)?, alphas());
     let mut residual = vec![Vector::zeros(); dphi.len()];
     // a = α₁ (Δφ − Δφ̂), and the share ε of the mass is lumped.
     let a = |node: usize| (dphi[node] - alphas.predicted(&nodal.velocity[node], &nodal.acceleration[node])) * alphas.a1;
@@ -118,11 +118,11 @@ fn by_formulas<const D: usize>(
     for p in 0..particles.len() {
         let h_n = &particles.displacement_gradient[p];
         // V₀ P F_nᵀ
-        let p_k = piola(&bodies[particles.body[p] as usize].law, compose(&supports.gradient_at(p, dphi), h_n))?;
+        let p_k = piola(&bodies[particles.body[p] as usize].law, compose(&connectivity.gradient_at(p, dphi), h_n))?;
         let sigma = p_k * (identity::<f64, D>() + h_n).transpose() * particles.volume[p];
         let mass = (1.0 - LUMPING) * particles.mass[p];
-        let acceleration: Vector<f64, D> = supports.of(p).map(|(node, n, _)| a(node) * n).sum();
-        for (node, n, grad_n) in supports.of(p) {
+        let acceleration: Vector<f64, D> = connectivity.of(p).map(|(node, n, _)| a(node) * n).sum();
+        for (node, n, grad_n) in connectivity.of(p) {
             residual[node] += sigma * grad_n + acceleration * (mass * n);
         }
     }
@@ -145,21 +145,22 @@ fn compare<const D: usize>() -> Result<(), Failure> {
         let others = [unknown(&|_| false), unknown(&|k| k % 2 == 1)];
         for shape in [Approximation::from(Linear), Lme::new(3.0, 1e-6).into()] {
             let case = format!("{D}D {list:?} {regime:?} {shape:?}");
-            let (supports, nodes) = Supports::new(&shape, &grid, &particles.position)?;
-            let (plain, _) = Supports::plain(&shape, &grid, &particles.position)?;
-            assert!(supports.is_tiled() && !plain.is_tiled());
+            let (connectivity, nodes) = Connectivity::new(&shape, &grid, &particles.position)?;
+            let (plain, _) = Connectivity::plain(&shape, &grid, &particles.position)?;
+            assert!(connectivity.is_tiled() && !plain.is_tiled());
             let u: Vec<Vector<f64, D>> =
                 (0..nodes.len()).map(|n| Vector::from_fn(|i, _| irregular(5 * n + i))).collect();
             let dphi: Vec<_> = u.iter().map(|u| u * 0.01).collect();
-            let of = |bodies: &[Body<Watched>], supports: &Supports<D>| {
-                results(&particles, bodies, supports, &dphi, &u, divides).map_err(|error| format!("{case}: {error}"))
+            let of = |bodies: &[Body<Watched>], connectivity: &Connectivity<D>| {
+                results(&particles, bodies, connectivity, &dphi, &u, divides)
+                    .map_err(|error| format!("{case}: {error}"))
             };
-            let in_lanes = results(&particles, &known, &supports, &dphi, &u, divides)
+            let in_lanes = results(&particles, &known, &connectivity, &dphi, &u, divides)
                 .map_err(|error| format!("{case}: {error}"))?;
-            assert!(in_lanes == of(&closed, &supports)?, "{case}: in lanes and one by one");
+            assert!(in_lanes == of(&closed, &connectivity)?, "{case}: in lanes and one by one");
             for bodies in [&closed, &others[0], &others[1]] {
-                let (tiled, plain) = (of(bodies, &supports)?, of(bodies, &plain)?);
-                let residual = by_formulas(&particles, bodies, &supports, &dphi)?;
+                let (tiled, plain) = (of(bodies, &connectivity)?, of(bodies, &plain)?);
+                let residual = by_formulas(&particles, bodies, &connectivity, &dphi)?;
                 for (name, found, expected, bound) in [
                     ("residual", &tiled.residual, &residual, 1e-14),
                     ("residual of the plain sweep", &plain.residual, &tiled.residual, 1e-13),
@@ -190,15 +191,15 @@ fn the_smallest_particle_that_cannot_be_deformed_is_named() -> Result<(), Failur
             particles.displacement_gradient[p] = Tensor::from_diagonal(&Vector::from([det_f - 1.0, 0.0]));
         }
         let (shape, at) = (Approximation::from(Linear), &particles.position);
-        let (tiled, nodes) = Supports::new(&shape, &grid, at)?;
-        let (plain, _) = Supports::plain(&shape, &grid, at)?;
+        let (tiled, nodes) = Connectivity::new(&shape, &grid, at)?;
+        let (plain, _) = Connectivity::plain(&shape, &grid, at)?;
         let zero = vec![Vector::zeros(); nodes.len()];
         let (known, unknown) = (bodies([law.clone()]), bodies([Watched::unlisted(law, closed)]));
         let expected = Inadmissible { particle: 17, source: NonPositiveJacobian { det_f: 0.0 } };
-        for (supports, threads) in [(&tiled, 1), (&tiled, 3), (&plain, 1), (&plain, 3)] {
+        for (connectivity, threads) in [(&tiled, 1), (&tiled, 3), (&plain, 1), (&plain, 3)] {
             in_threads(threads, || {
-                fails(&particles, &known, supports, &zero, expected);
-                fails(&particles, &unknown, supports, &zero, expected);
+                fails(&particles, &known, connectivity, &zero, expected);
+                fails(&particles, &unknown, connectivity, &zero, expected);
                 Ok(())
             })?;
         }
@@ -210,12 +211,13 @@ fn the_smallest_particle_that_cannot_be_deformed_is_named() -> Result<(), Failur
 fn fails<L: Law>(
     particles: &Particles<2>,
     bodies: &[Body<L>],
-    supports: &Supports<2>,
+    connectivity: &Connectivity<2>,
     zero: &[Vector<f64, 2>],
     expected: Inadmissible,
 ) {
-    let (nodal, loads, alphas) = (&Nodal::at_rest(particles, supports), &Loads::default(), alphas());
-    let step = Step { particles, bodies, loads, supports, nodal, alphas, lumping: 1.0, time: 0.0, dt: DT, poses: None };
+    let (nodal, loads, alphas) = (&Nodal::at_rest(particles, connectivity), &Loads::default(), alphas());
+    let step =
+        Step { particles, bodies, loads, connectivity, nodal, alphas, lumping: 1.0, time: 0.0, dt: DT, poses: None };
     let equilibrium = Equilibrium::new(step, &[]);
     assert_eq!(equilibrium.residual(zero), Err(expected));
     assert_eq!(

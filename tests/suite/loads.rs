@@ -9,7 +9,7 @@ use bfree::material::{Lame, Material, NeoHookean};
 use bfree::mechanics::loads::{Curve, ForceField, Gravity, Loads, Pressing, SurfaceLoad, SurfacePoint};
 use bfree::mechanics::residual::Equilibrium;
 use bfree::mechanics::schemes::Newmark;
-use bfree::mechanics::sweep::Supports;
+use bfree::mechanics::sweep::Connectivity;
 use bfree::mechanics::terms::Step;
 use bfree::mechanics::transfer::Nodal;
 use bfree::particles::Particles;
@@ -193,16 +193,26 @@ fn every_load_follows_its_curve() -> Result<(), Failure> {
     particles.push(Vector::from([0.5, 0.5]), Vector::zeros(), 1.0, 3.0, 0);
     let law = Material::from(NeoHookean::ciarlet(Lame::new(1.0, 1.0)?));
     let bodies = [body(law)];
-    let (supports, nodes) = Supports::new(&Approximation::from(Linear), &grid, &particles.position)?;
-    let (nodal, zero) = (Nodal::at_rest(&particles, &supports), vec![Vector::zeros(); nodes.len()]);
+    let (connectivity, nodes) = Connectivity::new(&Approximation::from(Linear), &grid, &particles.position)?;
+    let (nodal, zero) = (Nodal::at_rest(&particles, &connectivity), vec![Vector::zeros(); nodes.len()]);
     let alphas = Newmark::default().alphas(1.0);
     for (t, factor) in [(0.0, 0.0), (1.0, 0.5), (2.0, 1.0), (9.0, 2.0)] {
         // A particle of mass 3 in the middle of four nodes: a quarter of m b, and of T A, to each.
-        let (particles, bodies, supports, nodal) = (&particles, &bodies[..], &supports, &nodal);
+        let (particles, bodies, connectivity, nodal) = (&particles, &bodies[..], &connectivity, &nodal);
         let forces = |gravity: Option<Gravity<2>>, surface: &[SurfaceLoad<2>]| {
             let loads = &Loads { gravity, surface: surface.to_vec(), ..Loads::default() };
-            let step =
-                Step { particles, bodies, loads, supports, nodal, alphas, lumping: 1.0, time: t, dt: 1.0, poses: None };
+            let step = Step {
+                particles,
+                bodies,
+                loads,
+                connectivity,
+                nodal,
+                alphas,
+                lumping: 1.0,
+                time: t,
+                dt: 1.0,
+                poses: None,
+            };
             Equilibrium::new(step, &[]).external_force(&zero)
         };
         for force in &forces(loads.gravity.clone(), &loads.surface[..1])? {
@@ -257,19 +267,19 @@ fn a_field_acts_on_each_particle_where_it_is_and_when() -> Result<(), Failure> {
     let order: Vec<u32> = (0..simulation.particles.len() as u32).rev().collect();
     simulation.rearrange(&order);
     let particles = &simulation.particles;
-    let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
-    let nodal = Nodal::project(particles, &supports, 1.0)?;
+    let (connectivity, nodes) = Connectivity::new(&simulation.approximation, &simulation.grid, &particles.position)?;
+    let nodal = Nodal::project(particles, &connectivity, 1.0)?;
     let alphas = simulation.settings.scheme.end(0.02);
     let zero = vec![Vector::zeros(); nodes.len()];
     for t in [0.0, 0.3] {
-        let equilibrium = simulation.equilibrium(&supports, &nodal, &[], alphas, t);
+        let equilibrium = simulation.equilibrium(&connectivity, &nodal, &[], alphas, t);
         let (force, mut expected) = (equilibrium.external_force(&zero)?, zero.clone());
         let mut sum = Vector::zeros();
         for p in 0..particles.len() {
             let of_particle =
                 (b(particles.id[p] as usize, &particles.position[p], t) + gravity.acceleration) * particles.mass[p];
             sum += of_particle;
-            supports.of(p).for_each(|(node, n, _)| expected[node] += of_particle * n);
+            connectivity.of(p).for_each(|(node, n, _)| expected[node] += of_particle * n);
         }
         let largest = expected.iter().map(|f| f.norm()).fold(0.0, f64::max);
         assert!(force.iter().zip(&expected).all(|(a, b)| (a - b).norm() < 1e-14 * largest), "t = {t}");

@@ -2,7 +2,7 @@
 
 use crate::support::{Failure, built, merged, solid};
 use bfree::mechanics::check::direction;
-use bfree::mechanics::sweep::Supports;
+use bfree::mechanics::sweep::Connectivity;
 use bfree::mechanics::transfer::Nodal;
 use bfree::simulation::Simulation;
 use bfree::solver::{Multigrid, Preconditioner, Preconditioning};
@@ -122,9 +122,10 @@ fn cubic_splines_take_few_iterations_too() -> Result<(), Failure> {
 fn a_cycle_is_symmetric_and_positive() -> Result<(), Failure> {
     let simulation = block::<2>(&json!({"lme": {}}), 15, "newmark", json!({}))?;
     let (approximation, grid) = (&simulation.approximation, &simulation.grid);
-    let (supports, nodes) = Supports::new(approximation, grid, &simulation.particles.position)?;
-    let (nodal, prescribed) = (Nodal::at_rest(&simulation.particles, &supports), simulation.prescribed(&nodes));
-    let equilibrium = simulation.equilibrium(&supports, &nodal, &prescribed, simulation.settings.scheme.end(0.2), 0.2);
+    let (connectivity, nodes) = Connectivity::new(approximation, grid, &simulation.particles.position)?;
+    let (nodal, prescribed) = (Nodal::at_rest(&simulation.particles, &connectivity), simulation.prescribed(&nodes));
+    let equilibrium =
+        simulation.equilibrium(&connectivity, &nodal, &prescribed, simulation.settings.scheme.end(0.2), 0.2);
     let at_rest = vec![Default::default(); nodes.len()];
     let tangent = equilibrium.tangent(None, &at_rest)?;
     let mut multigrid = Multigrid::<2>::default();

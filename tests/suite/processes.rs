@@ -3,7 +3,7 @@
 
 use crate::support::{Failure, Said, built, merged, said, scene, solid};
 use bfree::mechanics::check::direction;
-use bfree::mechanics::sweep::{Mode, Points, Supports};
+use bfree::mechanics::sweep::{Connectivity, Mode, Points};
 use bfree::parallel::{Exchange, Processes};
 use bfree::plan::{Plan, ProcessUse};
 use bfree::pooled::Pool;
@@ -191,10 +191,10 @@ fn a_scatter_is_one_message_of_the_planned_length() -> Result<(), Failure> {
             let processes = Processes::new(Counted(one, counts.clone()));
             let points = Points { processes, ..Points::at(&start.particles.position) };
             let (approximation, pool) = (&start.approximation, Pool::default());
-            let (supports, _) = Supports::rebuilt(None, approximation, &start.grid, &points, &pool).unwrap();
+            let (connectivity, _) = Connectivity::rebuilt(None, approximation, &start.grid, &points, &pool).unwrap();
             counts.iter().for_each(|one| one.store(0, Ordering::Relaxed));
             let mut force = vec![Vector::zeros(); nodes];
-            supports.sweep(Some(&direction::<3>(nodes, 1)), Mode::BOTH, &mut force, |_, at, sums| *sums = *at);
+            connectivity.sweep(Some(&direction::<3>(nodes, 1)), Mode::BOTH, &mut force, |_, at, sums| *sums = *at);
             [0, 1].map(|which| counts[which].load(Ordering::Relaxed))
         };
         let all = thread::scope(|scope| {

@@ -4,7 +4,7 @@ use crate::support::{Failure, scene};
 use bfree::approximation::{Approximation, Bspline, Gimp, Linear, Lme};
 use bfree::grid::Grid;
 use bfree::mechanics::smoothing::Smoothing;
-use bfree::mechanics::sweep::Supports;
+use bfree::mechanics::sweep::Connectivity;
 use bfree::mechanics::transfer::Nodal;
 use bfree::particles::Particles;
 use bfree::simulation::Simulation;
@@ -30,25 +30,25 @@ fn cloud<const D: usize>() -> (Grid<D>, Particles<D>) {
 fn velocity_change<const D: usize>(
     smoothing: &Smoothing,
     particles: &Particles<D>,
-    supports: &Supports<D>,
+    connectivity: &Connectivity<D>,
     mass: &[f64],
     dt: f64,
 ) -> Vec<Vector<f64, D>> {
-    let at_kinks = smoothing.shares_at_kinks(particles, supports, mass, dt);
-    smoothing.change(particles, supports, mass, at_kinks.as_deref(), &particles.velocity, dt).to_vec()
+    let at_kinks = smoothing.shares_at_kinks(particles, connectivity, mass, dt);
+    smoothing.change(particles, connectivity, mass, at_kinks.as_deref(), &particles.velocity, dt).to_vec()
 }
 
 fn keeps_momentum_and_gains_no_energy<const D: usize>() -> Result<(), Failure> {
     let (grid, particles) = cloud::<D>();
     let scale: f64 = particles.mass.iter().zip(&particles.velocity).map(|(m, v)| m * v.norm()).sum();
     for family in families() {
-        let (supports, _) = Supports::new(&family, &grid, &particles.position)?;
-        let nodal = Nodal::project(&particles, &supports, 1.0)?;
+        let (connectivity, _) = Connectivity::new(&family, &grid, &particles.position)?;
+        let nodal = Nodal::project(&particles, &connectivity, 1.0)?;
         let mut energy_before = 0.0;
         let of_order = |order| [3.0, f64::INFINITY].map(|rate| Smoothing::uniform(order, rate));
         let limited = [3.0, f64::INFINITY].map(Smoothing::limited);
         for smoothing in [1, 2, 5, 20].into_iter().flat_map(of_order).chain(limited) {
-            let change = velocity_change(&smoothing, &particles, &supports, &nodal.mass, 0.1);
+            let change = velocity_change(&smoothing, &particles, &connectivity, &nodal.mass, 0.1);
             let mut changed = particles.clone();
             changed.velocity.iter_mut().zip(&change).for_each(|(v, change)| *v += change);
             let energy = changed.kinetic_energy();
@@ -75,15 +75,15 @@ fn smoothing_keeps_momentum_and_gains_no_energy() -> Result<(), Failure> {
 fn a_common_velocity_is_kept_and_two_half_steps_are_one_step() -> Result<(), Failure> {
     let (grid, mut particles) = cloud::<2>();
     let smoothing = Smoothing::uniform(2, 4.0);
-    let (supports, _) = Supports::new(&families()[4], &grid, &particles.position)?;
-    let nodal = Nodal::project(&particles, &supports, 1.0)?;
+    let (connectivity, _) = Connectivity::new(&families()[4], &grid, &particles.position)?;
+    let nodal = Nodal::project(&particles, &connectivity, 1.0)?;
     // 1 − θ(Δt) is exponential in Δt.
     let left = |dt: f64| 1.0 - smoothing.share(dt);
     assert!((left(0.2) - left(0.1) * left(0.1)).abs() < 1e-15);
     assert_eq!((smoothing.share(0.0), Smoothing::uniform(2, f64::INFINITY).share(0.1)), (0.0, 1.0));
     particles.velocity.fill(Vector::from([3.0, -2.0]));
     for smoothing in [smoothing, Smoothing::limited(4.0)] {
-        let change = velocity_change(&smoothing, &particles, &supports, &nodal.mass, 0.2);
+        let change = velocity_change(&smoothing, &particles, &connectivity, &nodal.mass, 0.2);
         assert!(change.iter().all(|change| change.norm() < 1e-14), "{change:?}");
     }
     Ok(())
@@ -92,14 +92,14 @@ fn a_common_velocity_is_kept_and_two_half_steps_are_one_step() -> Result<(), Fai
 #[test]
 fn many_terms_keep_what_the_nodes_can_represent() -> Result<(), Failure> {
     let (grid, particles) = cloud::<1>();
-    let (supports, nodes) = Supports::new(&Approximation::from(Linear), &grid, &particles.position)?;
-    let nodal = Nodal::project(&particles, &supports, 1.0)?;
+    let (connectivity, nodes) = Connectivity::new(&Approximation::from(Linear), &grid, &particles.position)?;
+    let nodal = Nodal::project(&particles, &connectivity, 1.0)?;
     let field: Vec<_> = nodes.positions(&grid).map(|(_, x)| x.map(|x| (7.0 * x).sin())).collect();
-    let represented = supports.values(&field);
+    let represented = connectivity.values(&field);
     let size = |field: &[Vector<f64, 1>]| field.iter().map(Vector::norm_squared).sum::<f64>().sqrt();
     let lost = |order| {
         let smoothing = Smoothing::uniform(order, f64::INFINITY);
-        size(&smoothing.change(&particles, &supports, &nodal.mass, None, &represented, 0.1)) / size(&represented)
+        size(&smoothing.change(&particles, &connectivity, &nodal.mass, None, &represented, 0.1)) / size(&represented)
     };
     assert!(lost(1) > 0.05 && lost(4) < 0.25 * lost(1) && lost(400) < 1e-4, "{} {} {}", lost(1), lost(4), lost(400));
     Ok(())
@@ -110,15 +110,15 @@ fn limited_smoothing_sees_neither_the_motion_of_the_frame_nor_its_axes() -> Resu
     let (grid, mut particles) = cloud::<2>();
     let smoothing = Smoothing::limited(4.0);
     for family in families() {
-        let (supports, _) = Supports::new(&family, &grid, &particles.position)?;
-        let nodal = Nodal::project(&particles, &supports, 1.0)?;
-        let still = velocity_change(&smoothing, &particles, &supports, &nodal.mass, 0.1);
+        let (connectivity, _) = Connectivity::new(&family, &grid, &particles.position)?;
+        let nodal = Nodal::project(&particles, &connectivity, 1.0)?;
+        let still = velocity_change(&smoothing, &particles, &connectivity, &nodal.mass, 0.1);
         let rest = particles.velocity.clone();
         // The same motion in another frame: v' = Q v + c.
         let (sin, cos) = 0.7_f64.sin_cos();
         let turned = |v: &Vector<f64, 2>| Vector::from([cos * v[0] - sin * v[1], sin * v[0] + cos * v[1]]);
         particles.velocity = rest.iter().map(|v| turned(v) + Vector::from([300.0, -20.0])).collect();
-        let moving = velocity_change(&smoothing, &particles, &supports, &nodal.mass, 0.1);
+        let moving = velocity_change(&smoothing, &particles, &connectivity, &nodal.mass, 0.1);
         for (still, moving) in still.iter().zip(&moving) {
             assert!((turned(still) - moving).norm() < 1e-10, "{family:?}: {still} {moving}");
         }
@@ -137,13 +137,13 @@ fn kinks_and_extrema_are_told_from_slopes() -> Result<(), Failure> {
     let smoothing = Smoothing::limited(1.0);
     let [.., cubic, lme] = families();
     for family in [cubic, lme] {
-        let (supports, nodes) = Supports::new(&family, &grid, &particles.position)?;
-        let nodal = Nodal::project(&particles, &supports, 1.0)?;
+        let (connectivity, nodes) = Connectivity::new(&family, &grid, &particles.position)?;
+        let nodal = Nodal::project(&particles, &connectivity, 1.0)?;
         let places: Vec<f64> = nodes.positions(&grid).map(|(_, x)| x[0]).collect();
         // min(1, (2q)³), from the shares of a step so short that the shares are proportional to it.
         let mut strength = |velocity: &dyn Fn(f64) -> f64| -> Result<Vec<(f64, f64)>, Failure> {
             particles.velocity = particles.position.iter().map(|x| x.map(velocity)).collect();
-            let shares = smoothing.shares_at_kinks(&particles, &supports, &nodal.mass, 1e-6);
+            let shares = smoothing.shares_at_kinks(&particles, &connectivity, &nodal.mass, 1e-6);
             let shares = shares.ok_or("limited smoothing has shares")?;
             // Nodes away from the ends of the bar.
             let inside = places.iter().zip(shares.to_vec()).filter(|(x, _)| (0.2..0.8).contains(*x));
@@ -188,10 +188,10 @@ fn with_a_lumped_mass_pic_gives_particles_the_velocity_of_their_nodes() -> Resul
     let mut flip = before.clone();
     flip.settings.smoothing = None;
     flip.step()?;
-    let (supports, _) = Supports::new(&before.approximation, &before.grid, &before.particles.position)?;
-    let nodal = Nodal::project(&before.particles, &supports, 1.0)?;
-    let at_start = supports.values(&nodal.velocity);
-    let accelerated = supports.values(&nodal.acceleration);
+    let (connectivity, _) = Connectivity::new(&before.approximation, &before.grid, &before.particles.position)?;
+    let nodal = Nodal::project(&before.particles, &connectivity, 1.0)?;
+    let at_start = connectivity.values(&nodal.velocity);
+    let accelerated = connectivity.values(&nodal.acceleration);
     let largest = accelerated.iter().map(Vector::norm).fold(0.0, f64::max);
     assert!(largest > 0.0);
     // The comparison requires that no step has reordered the particles.
@@ -235,11 +235,11 @@ fn a_node_without_mass_does_not_disturb_its_particle() -> Result<(), Failure> {
     let grid = Grid::<1> { origin: Vector::zeros(), spacing: 1.0, cells: [3] };
     let mut particles = Particles::default();
     particles.push(Vector::from([1.0]), Vector::from([4.0]), 1.0, 1.0, 0);
-    let (supports, _) = Supports::new(&Approximation::from(Linear), &grid, &particles.position)?;
-    let nodal = Nodal::project(&particles, &supports, 1.0)?;
+    let (connectivity, _) = Connectivity::new(&Approximation::from(Linear), &grid, &particles.position)?;
+    let nodal = Nodal::project(&particles, &connectivity, 1.0)?;
     assert!(nodal.mass.contains(&0.0) && nodal.velocity.iter().all(|v| v[0] == 0.0 || v[0] == 4.0));
     for smoothing in [Smoothing::uniform(3, f64::INFINITY), Smoothing::limited(f64::INFINITY)] {
-        let change = velocity_change(&smoothing, &particles, &supports, &nodal.mass, 0.1);
+        let change = velocity_change(&smoothing, &particles, &connectivity, &nodal.mass, 0.1);
         assert_eq!(change, [Vector::from([0.0])], "{smoothing:?}");
     }
     Ok(())

@@ -1,7 +1,7 @@
 //! The order of the particles in memory is near that of the transfer, and has no influence on the results.
 
 use crate::support::{Failure, Random, restored, scene};
-use bfree::mechanics::sweep::Supports;
+use bfree::mechanics::sweep::Connectivity;
 use bfree::plan::Plan;
 use bfree::simulation::Simulation;
 use bfree::tensor::Vector;
@@ -42,8 +42,8 @@ fn no_bit_depends_on_where_particles_lie() -> Result<(), Failure> {
 fn a_step_puts_the_particles_where_the_sweep_looks_for_them() -> Result<(), Failure> {
     let mut simulation = shuffled(&scene::<2>("collision.json", &[])?);
     let is_in_block_order = |of: &Simulation<2>, positions: &[Vector<f64, 2>]| -> Result<bool, Failure> {
-        let (supports, _) = Supports::new(&of.approximation, &of.grid, positions)?;
-        Ok(supports.block_order().is_none())
+        let (connectivity, _) = Connectivity::new(&of.approximation, &of.grid, positions)?;
+        Ok(connectivity.block_order().is_none())
     };
     assert!(!is_in_block_order(&simulation, &simulation.particles.position)?);
     for _ in 0..3 {

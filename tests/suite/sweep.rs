@@ -9,7 +9,7 @@ use bfree::material::{ClosedTangent, Lame, Law, Material, MaterialState, NeoHook
 use bfree::mechanics::loads::Loads;
 use bfree::mechanics::residual::{Equilibrium, Inadmissible};
 use bfree::mechanics::schemes::Newmark;
-use bfree::mechanics::sweep::{Mode, Points, Supports, Weights};
+use bfree::mechanics::sweep::{Connectivity, Mode, Points, Weights};
 use bfree::mechanics::tangent::tangent_bytes;
 use bfree::mechanics::terms::Step;
 use bfree::mechanics::transfer::Nodal;
@@ -100,7 +100,12 @@ fn square<T: Real, const D: usize>(
 }
 
 /// Scalar nodal fields, and sums with |N| and N², against loops over the connectivity of every particle.
-fn scalars_and_weights<const D: usize>(fast: &Supports<D>, plain: &Supports<D>, u: &[Vector<f64, D>], case: &str) {
+fn scalars_and_weights<const D: usize>(
+    fast: &Connectivity<D>,
+    plain: &Connectivity<D>,
+    u: &[Vector<f64, D>],
+    case: &str,
+) {
     let first: Vec<_> = u.iter().map(|u| Vector::from([u[0]])).collect();
     let value = |p: usize| Vector::from([1.0 - 1e-3 * p as f64]);
     for weights in [Weights::Signed, Weights::Magnitude, Weights::Square] {
@@ -120,9 +125,9 @@ fn scalars_and_weights<const D: usize>(fast: &Supports<D>, plain: &Supports<D>, 
                 expected[node][0] += at * value(p)[0] * weigh(n) + gradient.dot(&grad_n.map(weigh));
             }
         }
-        for supports in [fast, plain] {
+        for connectivity in [fast, plain] {
             let mut out = vec![Vector::from([0.0]); u.len()];
-            supports.sweep(Some(&first), Mode { weights, ..Mode::BOTH }, &mut out, |group, at, sums| {
+            connectivity.sweep(Some(&first), Mode { weights, ..Mode::BOTH }, &mut out, |group, at, sums| {
                 for (lane, &p) in group.particles.iter().enumerate() {
                     let (u, gradient) = at.lane(lane);
                     sums.value[0][lane] += u[0] * value(p as usize)[0];
@@ -145,8 +150,8 @@ fn field<const D: usize>(nodes: &Nodes) -> Vec<Vector<f64, D>> {
 fn compare<const D: usize>() {
     let (grid, positions) = case::<D>();
     for shape in shapes() {
-        let (fast, nodes) = Supports::new(&shape, &grid, &positions).unwrap();
-        let (plain, expected) = Supports::plain(&shape, &grid, &positions).unwrap();
+        let (fast, nodes) = Connectivity::new(&shape, &grid, &positions).unwrap();
+        let (plain, expected) = Connectivity::plain(&shape, &grid, &positions).unwrap();
         assert_eq!(nodes, expected, "{shape:?}");
         assert_eq!(fast.particles(), positions.len());
         for p in 0..positions.len() {
@@ -155,16 +160,16 @@ fn compare<const D: usize>() {
         }
         let u = field::<D>(&nodes);
         let zeros = vec![Vector::zeros(); u.len()];
-        let assembled = |supports: &Supports<D>| {
+        let assembled = |connectivity: &Connectivity<D>| {
             let mut out = zeros.clone();
-            supports.assemble(&u, Weights::Signed, &mut out, point).unwrap();
+            connectivity.assemble(&u, Weights::Signed, &mut out, point).unwrap();
             out
         };
         let worst = difference(&assembled(&fast), &assembled(&plain));
         assert!(worst < 1e-12, "{D}D {shape:?}: assembled {worst:e}");
-        let magnitudes = |supports: &Supports<D>| {
+        let magnitudes = |connectivity: &Connectivity<D>| {
             let mut out = zeros.clone();
-            supports.assemble(&u, Weights::Magnitude, &mut out, point).unwrap();
+            connectivity.assemble(&u, Weights::Magnitude, &mut out, point).unwrap();
             out
         };
         let worst = difference(&magnitudes(&fast), &magnitudes(&plain));
@@ -174,11 +179,11 @@ fn compare<const D: usize>() {
         scalars_and_weights(&fast, &plain, &u, &format!("{D}D {shape:?}"));
         // A dual number is two fields in the same kernels.
         let seeded: Vec<Vector<Dual64, D>> = u.iter().map(|u| u.map(|x| Dual64::new(x, 0.5 - x))).collect();
-        let duals = |supports: &Supports<D>| {
+        let duals = |connectivity: &Connectivity<D>| {
             // Sums that are added to nonzero output.
             let (mut out, mut real) = (seeded.clone(), u.clone());
-            supports.assemble(&seeded, Weights::Signed, &mut out, square).unwrap();
-            supports.assemble(&u, Weights::Signed, &mut real, square).unwrap();
+            connectivity.assemble(&seeded, Weights::Signed, &mut out, square).unwrap();
+            connectivity.assemble(&u, Weights::Signed, &mut real, square).unwrap();
             let same = out.iter().flatten().zip(real.iter().flatten()).all(|(a, b)| a.re.to_bits() == b.to_bits());
             assert!(same, "{D}D {shape:?}: the real part of dual numbers");
             out.iter().map(|x| x.map(|x| x.eps)).collect::<Vec<_>>()
@@ -218,21 +223,21 @@ fn one_a_cell<const D: usize>(cells: [u32; D]) -> Result<(Grid<D>, Particles<D>,
 
 /// The results of a step that are sums over blocks.
 fn computed<const D: usize>(
-    supports: &Supports<D>,
+    connectivity: &Connectivity<D>,
     nodes: &Nodes,
     particles: &Particles<D>,
     bodies: &[Body<Material>],
 ) -> Result<[(&'static str, Vec<f64>); 8], Failure> {
     let flat = |field: &[Vector<f64, D>]| field.iter().flat_map(|x| x.iter().copied()).collect::<Vec<_>>();
-    let nodal = Nodal::project(particles, supports, 1.0)?;
+    let nodal = Nodal::project(particles, connectivity, 1.0)?;
     let (alphas, loads) = (Newmark::default().alphas(1.0), Loads::default());
     let (nodal, loads) = (&nodal, &loads);
     let step =
-        Step { particles, bodies, loads, supports, nodal, alphas, lumping: 0.5, time: 0.0, dt: 1.0, poses: None };
+        Step { particles, bodies, loads, connectivity, nodal, alphas, lumping: 0.5, time: 0.0, dt: 1.0, poses: None };
     let equilibrium = Equilibrium::new(step, &[]);
     let u = field::<D>(nodes);
     let dphi: Vec<_> = u.iter().map(|u| u * 0.02).collect();
-    let gathered = supports.evaluate(&u, |_, value, gradient| value.sum() + gradient.sum());
+    let gathered = connectivity.evaluate(&u, |_, value, gradient| value.sum() + gradient.sum());
     let mut product = vec![Vector::zeros(); u.len()];
     let tangent = equilibrium.tangent(None, &dphi)?;
     tangent.product(&u, &mut product);
@@ -240,7 +245,7 @@ fn computed<const D: usize>(
     Ok([
         ("mass", nodal.mass.to_vec()),
         ("momentum", flat(&nodal.velocity)),
-        ("values", flat(&supports.values(&u))),
+        ("values", flat(&connectivity.values(&u))),
         ("values and gradients", gathered),
         ("forces", flat(&equilibrium.residual(&dphi)?)),
         ("product with the tangent", flat(&product)),
@@ -254,12 +259,12 @@ fn many_blocks<const D: usize>(cells: [u32; D]) -> Result<(), Failure> {
     let (shape, at) = (Approximation::from(Linear), &particles.position);
     let with = |threads: usize| {
         in_threads(threads, || {
-            let (supports, nodes) = Supports::new(&shape, &grid, at)?;
-            computed(&supports, &nodes, &particles, &bodies)
+            let (connectivity, nodes) = Connectivity::new(&shape, &grid, at)?;
+            computed(&connectivity, &nodes, &particles, &bodies)
         })
     };
     let one = with(1)?;
-    let (plain, nodes) = Supports::plain(&shape, &grid, at)?;
+    let (plain, nodes) = Connectivity::plain(&shape, &grid, at)?;
     for ((name, fast), (_, plain)) in one.iter().zip(computed(&plain, &nodes, &particles, &bodies)?) {
         assert_eq!(fast.len(), plain.len(), "{D}D: {name}");
         let largest = plain.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
@@ -289,10 +294,11 @@ fn renewal<const D: usize>() {
     let before: Vec<Vector<f64, D>> =
         after.iter().map(|_| grid.origin + random.vector::<D>().map(|x| (0.5 + 0.4 * x) * 0.7)).collect();
     for shape in shapes() {
-        let anew = Supports::new(&shape, &grid, &after).unwrap();
+        let anew = Connectivity::new(&shape, &grid, &after).unwrap();
         for other in shapes() {
-            let (spare, _) = Supports::new(&other, &grid, &before).unwrap();
-            let renewed = Supports::rebuilt(Some(spare), &shape, &grid, &Points::at(&after), &Pool::default()).unwrap();
+            let (spare, _) = Connectivity::new(&other, &grid, &before).unwrap();
+            let renewed =
+                Connectivity::rebuilt(Some(spare), &shape, &grid, &Points::at(&after), &Pool::default()).unwrap();
             assert_eq!(renewed.1, anew.1);
             assert_eq!(renewed.0.windows(), anew.0.windows());
             for p in 0..after.len() {
@@ -305,14 +311,14 @@ fn renewal<const D: usize>() {
     }
 }
 
-fn sums<const D: usize>(supports: &Supports<D>, u: &[Vector<f64, D>]) -> Vec<Vector<f64, D>> {
+fn sums<const D: usize>(connectivity: &Connectivity<D>, u: &[Vector<f64, D>]) -> Vec<Vector<f64, D>> {
     let mut out = vec![Vector::zeros(); u.len()];
-    supports.assemble(u, Weights::Signed, &mut out, |_, u, l| Ok::<_, Inadmissible>((u, l))).unwrap();
+    connectivity.assemble(u, Weights::Signed, &mut out, |_, u, l| Ok::<_, Inadmissible>((u, l))).unwrap();
     out
 }
 
 #[test]
-fn supports_do_not_depend_on_those_whose_memory_they_use() {
+fn connectivity_does_not_depend_on_that_whose_memory_it_uses() {
     renewal::<1>();
     renewal::<2>();
     renewal::<3>();
@@ -322,7 +328,7 @@ fn supports_do_not_depend_on_those_whose_memory_they_use() {
 fn the_first_particle_that_fails_is_named() {
     let (grid, mut positions) = case::<2>();
     for shape in shapes() {
-        let (fast, nodes) = Supports::new(&shape, &grid, &positions).unwrap();
+        let (fast, nodes) = Connectivity::new(&shape, &grid, &positions).unwrap();
         let u = field::<2>(&nodes);
         let mut out = vec![Vector::zeros(); u.len()];
         let fails = |p: usize, u, l| if p % 100 == 77 { Err(p) } else { Ok((u, l)) };
@@ -332,8 +338,8 @@ fn the_first_particle_that_fails_is_named() {
     positions[300][1] = f64::NAN;
     positions[200][0] = 17.0;
     for shape in shapes() {
-        let fast = Supports::new(&shape, &grid, &positions).map(|_| ()).unwrap_err();
-        let plain = Supports::plain(&shape, &grid, &positions).map(|_| ()).unwrap_err();
+        let fast = Connectivity::new(&shape, &grid, &positions).map(|_| ()).unwrap_err();
+        let plain = Connectivity::plain(&shape, &grid, &positions).map(|_| ()).unwrap_err();
         assert_eq!((fast.particle, fast.source), (plain.particle, plain.source));
         assert_eq!(plain.particle, 200);
     }

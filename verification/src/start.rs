@@ -2,7 +2,7 @@
 
 use bfree::approximation::ShapeFunction;
 use bfree::material::Law;
-use bfree::mechanics::sweep::Supports;
+use bfree::mechanics::sweep::Connectivity;
 use bfree::mechanics::transfer::Nodal;
 use bfree::simulation::{Simulation, StepError};
 use bfree::tensor::Vector;
@@ -18,8 +18,8 @@ pub fn velocity_by_masses<const D: usize, L: Law, A: ShapeFunction>(
 ) -> Result<(), StepError> {
     let particles = &mut simulation.particles;
     particles.velocity = particles.position.iter().map(velocity).collect();
-    let (supports, _) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
-    let nodal = Nodal::project(particles, &supports, 1.0)?;
-    particles.velocity = supports.values(&nodal.velocity).to_vec();
+    let (connectivity, _) = Connectivity::new(&simulation.approximation, &simulation.grid, &particles.position)?;
+    let nodal = Nodal::project(particles, &connectivity, 1.0)?;
+    particles.velocity = connectivity.values(&nodal.velocity).to_vec();
     Ok(())
 }

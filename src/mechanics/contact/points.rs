@@ -2,7 +2,7 @@
 
 use super::law::{ContactLaw, Ends};
 use crate::mechanics::loads::{BodyContact, Candidate, ContactConstants, Contacts, Pose, Share, SurfacePoint};
-use crate::mechanics::sweep::Supports;
+use crate::mechanics::sweep::Connectivity;
 use crate::scalar::Real;
 use crate::shape::Feature;
 use crate::tensor::{Tensor, Vector, identity};
@@ -189,16 +189,16 @@ impl<const D: usize> Carrier<D> {
     pub(crate) fn position<T: Real>(
         &self,
         reference: &[Vector<f64, D>],
-        supports: &Supports<D>,
+        connectivity: &Connectivity<D>,
         phi: &[Vector<T, D>],
     ) -> Vector<T, D> {
         let start = (reference[self.particle] + self.offset).map(T::lit);
-        self.weights(supports).fold(start, |x, (node, n)| x + phi[node] * T::lit(n))
+        self.weights(connectivity).fold(start, |x, (node, n)| x + phi[node] * T::lit(n))
     }
 
     /// The nodes that move the place, and their functions there: N + ∇N·offset.
-    pub(crate) fn weights<'a>(&'a self, supports: &'a Supports<D>) -> impl Iterator<Item = (usize, f64)> + 'a {
-        supports.of(self.particle).map(|(node, n, grad_n)| (node, n + grad_n.dot(&self.offset)))
+    pub(crate) fn weights<'a>(&'a self, connectivity: &'a Connectivity<D>) -> impl Iterator<Item = (usize, f64)> + 'a {
+        connectivity.of(self.particle).map(|(node, n, grad_n)| (node, n + grad_n.dot(&self.offset)))
     }
 }
 

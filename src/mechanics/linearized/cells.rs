@@ -5,7 +5,7 @@ use crate::gpu::{self, Gpu};
 use crate::lanes::LANES;
 use crate::mechanics::constitutive::Form;
 use crate::mechanics::dilatation::{Cells, Member, Scale};
-use crate::mechanics::sweep::{At, Group, Supports};
+use crate::mechanics::sweep::{At, Connectivity, Group};
 use crate::tensor::{Tensor, Vector};
 use std::sync::Arc;
 
@@ -78,12 +78,12 @@ impl<const D: usize> CellRows<D> {
         cells: Arc<Cells>,
         layout: CellLayout,
         stiffness: Vec<f64>,
-        supports: &Supports<D>,
+        connectivity: &Connectivity<D>,
         phi: &[Vector<f64, D>],
         fill: impl Fn(usize, usize, &Tensor<f64, D>, usize, &mut [[f64; LANES]]) + Sync,
     ) -> Self {
-        let mut rows = supports.pool().unspecified(supports.groups() * layout.count, [0.0; LANES]);
-        supports.fill_all_rows(phi, layout.count, &mut rows, |group, at, rows| {
+        let mut rows = connectivity.pool().unspecified(connectivity.groups() * layout.count, [0.0; LANES]);
+        connectivity.fill_all_rows(phi, layout.count, &mut rows, |group, at, rows| {
             rows.fill([0.0; LANES]);
             for (lane, &p) in group.particles.iter().enumerate() {
                 if let Some(cell) = cells.cell(p) {
@@ -114,9 +114,9 @@ impl<const D: usize> CellRows<D> {
     }
 
     /// A copy on a device.
-    pub(crate) fn on_device(&self, gpu: &Gpu, supports: &Supports<D>) -> gpu::Rows {
+    pub(crate) fn on_device(&self, gpu: &Gpu, connectivity: &Connectivity<D>) -> gpu::Rows {
         let (mut first, mut members) = (vec![0], Vec::new());
-        let mut of_particles = vec![u32::MAX; supports.groups() * LANES];
+        let mut of_particles = vec![u32::MAX; connectivity.groups() * LANES];
         for (cell, (own, _)) in self.cells.iter().enumerate() {
             members.extend(own.iter().map(|member| member.slot));
             first.push(members.len() as u32);
@@ -135,10 +135,10 @@ impl<const D: usize> CellRows<D> {
     }
 
     /// δp of every cell: as given in the mixed form, or k δv.
-    pub(crate) fn pressure_changes(&self, supports: &Supports<D>, along: Along<'_, D>) -> Vec<f64> {
+    pub(crate) fn pressure_changes(&self, connectivity: &Connectivity<D>, along: Along<'_, D>) -> Vec<f64> {
         let volumes = match along {
             Along::Field(_, Some(pressures)) if self.mixed.is_some() => return pressures.to_vec(),
-            Along::Field(u, _) => self.volume_changes(supports, u),
+            Along::Field(u, _) => self.volume_changes(connectivity, u),
             Along::Gradient(gradient) => {
                 let sum = |members: &[Member]| members.iter().map(|one| self.volume_gradient(one).dot(gradient)).sum();
                 self.cells.iter().map(|(members, _)| sum(members)).collect()
@@ -148,9 +148,9 @@ impl<const D: usize> CellRows<D> {
     }
 
     /// δv of every cell.
-    pub(crate) fn volume_changes(&self, supports: &Supports<D>, u: &[Vector<f64, D>]) -> Vec<f64> {
-        let mut grown = supports.pool().unspecified(supports.groups(), [0.0; LANES]);
-        supports.fill_all_rows(u, 1, &mut grown, |group, at, grown| {
+    pub(crate) fn volume_changes(&self, connectivity: &Connectivity<D>, u: &[Vector<f64, D>]) -> Vec<f64> {
+        let mut grown = connectivity.pool().unspecified(connectivity.groups(), [0.0; LANES]);
+        connectivity.fill_all_rows(u, 1, &mut grown, |group, at, grown| {
             let b = &self.rows.of_group(group.number)[self.layout.b..];
             grown[0] = [0.0; LANES];
             for (b, l) in b.iter().zip(at.gradient.as_flattened()) {

@@ -3,7 +3,7 @@
 use super::FunctionsAt;
 use crate::gpu::{self, Gpu};
 use crate::mechanics::contact::{Carrier, FreePoint};
-use crate::mechanics::sweep::Supports;
+use crate::mechanics::sweep::Connectivity;
 use crate::tensor::{Tensor, Vector};
 use std::collections::BTreeMap;
 
@@ -30,11 +30,11 @@ pub(crate) struct ContactRow<const D: usize> {
 }
 
 impl<const D: usize> ContactRows<D> {
-    pub(crate) fn new(rows: Vec<ContactRow<D>>, obstacles: usize, supports: &Supports<D>) -> Self {
+    pub(crate) fn new(rows: Vec<ContactRow<D>>, obstacles: usize, connectivity: &Connectivity<D>) -> Self {
         let (mut ends, mut weights) = (Vec::with_capacity(rows.len()), Vec::new());
         for row in &rows {
             for carrier in &row.carriers {
-                weights.extend(carrier.weights(supports).map(|(node, n)| (node, carrier.share * n)));
+                weights.extend(carrier.weights(connectivity).map(|(node, n)| (node, carrier.share * n)));
             }
             ends.push(weights.len());
         }

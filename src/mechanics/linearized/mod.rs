@@ -21,7 +21,7 @@ pub(crate) use rows::Rows;
 use crate::gpu::{self, Gpu};
 use crate::mechanics::effective::Function;
 use crate::mechanics::mass::Mass;
-use crate::mechanics::sweep::{At, Group, Mode, Quadratic, Supports};
+use crate::mechanics::sweep::{At, Connectivity, Group, Mode, Quadratic};
 use crate::tensor::{Tensor, Vector, identity, scaled};
 
 /// A linearised step. By default it is that of no term.
@@ -65,8 +65,8 @@ impl<const D: usize> Linearized<D> {
     ) {
         self.add_product_at_nodes(mass, u, out);
         let Some(mode) = self.mode(mass) else { return };
-        let changes = self.pressure_changes(mass.supports, Along::Field(u, pressures));
-        mass.supports.sweep(Some(u), mode, out, |group, at, sums| {
+        let changes = self.pressure_changes(mass.connectivity, Along::Field(u, pressures));
+        mass.connectivity.sweep(Some(u), mode, out, |group, at, sums| {
             self.add_product_of_group(mass, &changes, group, at, sums);
         });
     }
@@ -76,7 +76,7 @@ impl<const D: usize> Linearized<D> {
         if self.mass != 0.0 {
             mass.add_lumped(self.mass, u, out);
         }
-        self.pressures.add_product(mass.supports, u, out);
+        self.pressures.add_product(mass.connectivity, u, out);
         self.contacts.add_product(u, out);
     }
 
@@ -88,8 +88,8 @@ impl<const D: usize> Linearized<D> {
     }
 
     /// δp of all averaged cells.
-    pub(crate) fn pressure_changes(&self, supports: &Supports<D>, along: Along<'_, D>) -> PressureChanges {
-        self.cells.iter().map(|cells| cells.pressure_changes(supports, along)).collect()
+    pub(crate) fn pressure_changes(&self, connectivity: &Connectivity<D>, along: Along<'_, D>) -> PressureChanges {
+        self.cells.iter().map(|cells| cells.pressure_changes(connectivity, along)).collect()
     }
 
     /// Adds q and σ of a group of particles to `sums`.
@@ -114,9 +114,9 @@ impl<const D: usize> Linearized<D> {
     }
 
     /// The rows of laws and averaged cells on a device.
-    pub(crate) fn rows_on_device(&self, gpu: &Gpu, supports: &Supports<D>) -> Vec<gpu::Rows> {
+    pub(crate) fn rows_on_device(&self, gpu: &Gpu, connectivity: &Connectivity<D>) -> Vec<gpu::Rows> {
         let stresses = self.stresses.iter().map(|rows| rows.on_device(gpu));
-        stresses.chain(self.cells.iter().map(|cells| cells.on_device(gpu, supports))).collect()
+        stresses.chain(self.cells.iter().map(|cells| cells.on_device(gpu, connectivity))).collect()
     }
 
     /// Adds the diagonal blocks of the lumped mass.

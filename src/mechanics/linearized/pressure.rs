@@ -2,7 +2,7 @@
 
 use super::FunctionsAt;
 use crate::gpu::{self, Gpu};
-use crate::mechanics::sweep::Supports;
+use crate::mechanics::sweep::Connectivity;
 use crate::tensor::{Tensor, Vector, cofactor_derivative};
 
 /// The points of loaded surfaces.
@@ -20,11 +20,11 @@ pub(crate) struct PressureRow<const D: usize> {
 }
 
 impl<const D: usize> PressureRows<D> {
-    pub(crate) fn add_product(&self, supports: &Supports<D>, u: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
+    pub(crate) fn add_product(&self, connectivity: &Connectivity<D>, u: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
         for PressureRow { particle, delta_f, force } in &self.0 {
-            let delta = cofactor_derivative(delta_f, &supports.gradient_at(*particle, u)) * force;
+            let delta = cofactor_derivative(delta_f, &connectivity.gradient_at(*particle, u)) * force;
             mutant!("loads: the tangent of a pressure has a wrong sign": delta = -delta);
-            for (node, n, _) in supports.of(*particle) {
+            for (node, n, _) in connectivity.of(*particle) {
                 out[node] += delta * n;
             }
         }
@@ -43,10 +43,10 @@ impl<const D: usize> PressureRows<D> {
     }
 
     /// A copy on a device; `None` without a point. There the product is a sum over nodes, and rounds in another order.
-    pub(crate) fn on_device(&self, gpu: &Gpu, supports: &Supports<D>) -> Option<gpu::Points> {
+    pub(crate) fn on_device(&self, gpu: &Gpu, connectivity: &Connectivity<D>) -> Option<gpu::Points> {
         let mut arrays = gpu::PointArrays { first: vec![0], ..gpu::PointArrays::default() };
         for row in &self.0 {
-            for (node, n, gradient) in supports.of(row.particle) {
+            for (node, n, gradient) in connectivity.of(row.particle) {
                 arrays.nodes.push(node as u32);
                 arrays.weights.push(n);
                 (0..D).for_each(|k| arrays.blocks.extend(row.column(k, &gradient).iter()));
@@ -54,7 +54,7 @@ impl<const D: usize> PressureRows<D> {
             arrays.first.push(arrays.nodes.len() as u32);
             arrays.on_free.push(gpu::NO_OBSTACLE);
         }
-        gpu::Points::new(gpu, D, supports.nodes(), &arrays)
+        gpu::Points::new(gpu, D, connectivity.nodes(), &arrays)
     }
 }
 

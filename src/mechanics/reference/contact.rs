@@ -2,7 +2,7 @@
 
 use crate::grid::{Grid, indices};
 use crate::mechanics::loads::Prescribed;
-use crate::mechanics::sweep::Supports;
+use crate::mechanics::sweep::Connectivity;
 use crate::parallel::{self, PART};
 use crate::particles::Particles;
 use crate::tensor::Vector;
@@ -21,11 +21,11 @@ const ALONE: f64 = 1e-9;
 pub(crate) fn reached_conditions<const D: usize>(
     particles: &Particles<D>,
     prescribed: &[Prescribed<D>],
-    supports: &Supports<D>,
+    connectivity: &Connectivity<D>,
 ) -> BTreeSet<usize> {
-    let (grid, nodes) = (supports.grid(), supports.active());
+    let (grid, nodes) = (connectivity.grid(), connectivity.active());
     let (present, at_reset) = (&particles.position, particles.reference().position);
-    let field = |p: usize| supports.field_of(particles.body[p]);
+    let field = |p: usize| connectivity.field_of(particles.body[p]);
     let holders = |index: [u32; D]| {
         let position = grid.position(index);
         prescribed.iter().enumerate().filter(move |(_, one)| one.on.holds(grid, index, &position)).map(|(one, _)| one)
@@ -74,16 +74,16 @@ pub(crate) fn reached_conditions<const D: usize>(
 pub(crate) fn reached_body<const D: usize>(
     particles: &Particles<D>,
     bonded: &BTreeSet<[u32; 2]>,
-    supports: &Supports<D>,
+    connectivity: &Connectivity<D>,
 ) -> bool {
     mutant!("reference: no body that is met resets the grid": { return false; });
-    let (grid, body) = (supports.grid(), &particles.body);
+    let (grid, body) = (connectivity.grid(), &particles.body);
     let at_reset = particles.reference().position;
     let [now, before] = [&particles.position[..], at_reset].map(|position| seen(position, body, grid));
     let beside = |x: &Vector<f64, D>, own: u32, seen: &HashMap<u64, BTreeSet<u32>>| {
         let others = |index| seen.get(&grid.id(index)).into_iter().flatten();
         let is_contact =
-            |&other: &u32| other != own && stick(supports, pair(own, other)) && !bonded.contains(&pair(own, other));
+            |&other: &u32| other != own && stick(connectivity, pair(own, other)) && !bonded.contains(&pair(own, other));
         grid.cell(x).is_some_and(|cell| corners(cell).flat_map(others).any(is_contact))
     };
     let mut all = particles.position.iter().zip(at_reset).zip(body);
@@ -91,8 +91,8 @@ pub(crate) fn reached_body<const D: usize>(
 }
 
 /// Whether two bodies stick to each other where they share nodes.
-fn stick<const D: usize>(supports: &Supports<D>, bodies: [u32; 2]) -> bool {
-    supports.field_of(bodies[0]) == supports.field_of(bodies[1])
+fn stick<const D: usize>(connectivity: &Connectivity<D>, bodies: [u32; 2]) -> bool {
+    connectivity.field_of(bodies[0]) == connectivity.field_of(bodies[1])
 }
 
 fn pair(one: u32, other: u32) -> [u32; 2] {
@@ -114,26 +114,26 @@ fn seen<const D: usize>(position: &[Vector<f64, D>], body: &[u32], grid: &Grid<D
 pub(crate) fn pairs<const D: usize>(
     position: &[Vector<f64, D>],
     body: &[u32],
-    supports: &Supports<D>,
+    connectivity: &Connectivity<D>,
 ) -> BTreeSet<[u32; 2]> {
     let mut pairs = BTreeSet::new();
-    for bodies in seen(position, body, supports.grid()).values() {
+    for bodies in seen(position, body, connectivity.grid()).values() {
         for &one in bodies {
-            pairs.extend(bodies.range(one + 1..).map(|&other| [one, other]).filter(|&pair| stick(supports, pair)));
+            pairs.extend(bodies.range(one + 1..).map(|&other| [one, other]).filter(|&pair| stick(connectivity, pair)));
         }
     }
     pairs
 }
 
 /// Whether two bodies of one nodal field lie in cells with a common corner now, or shared a node when the shape functions were evaluated.
-pub(crate) fn touch<const D: usize>(particles: &Particles<D>, supports: &Supports<D>) -> bool {
-    if !pairs(&particles.position, &particles.body, supports).is_empty() {
+pub(crate) fn touch<const D: usize>(particles: &Particles<D>, connectivity: &Connectivity<D>) -> bool {
+    if !pairs(&particles.position, &particles.body, connectivity).is_empty() {
         return true;
     }
     // The variance of the body index, weighted with N.
     let sum = |power: i32| {
-        let mut sum: Vec<Vector<f64, 1>> = vec![Vector::zeros(); supports.active().len()];
-        supports.spread(&mut sum, |p| Vector::from([f64::from(particles.body[p]).powi(power)]));
+        let mut sum: Vec<Vector<f64, 1>> = vec![Vector::zeros(); connectivity.active().len()];
+        connectivity.spread(&mut sum, |p| Vector::from([f64::from(particles.body[p]).powi(power)]));
         sum
     };
     let [weights, means, squares] = [0, 1, 2].map(sum);

@@ -4,7 +4,7 @@ use crate::material::Law;
 use crate::mechanics::loads::ForceField;
 use crate::mechanics::loads::{Loads, PrescribedDof, Reaction};
 use crate::mechanics::residual::{Equilibrium, Inadmissible};
-use crate::mechanics::sweep::Supports;
+use crate::mechanics::sweep::Connectivity;
 use crate::mechanics::terms::Step;
 use crate::mechanics::trial::Trial;
 use crate::pooled::Pooled;
@@ -41,12 +41,12 @@ impl<const D: usize> LastEquilibrium<D> {
     }
 
     /// Whether a condition that held bodies of a nodal field in this equilibrium has no node of the field among `prescribed`.
-    pub(crate) fn lost_support(&self, supports: &Supports<D>, prescribed: &[PrescribedDof]) -> bool {
+    pub(crate) fn lost_support(&self, connectivity: &Connectivity<D>, prescribed: &[PrescribedDof]) -> bool {
         mutant!("reference: a support that is lost still holds": { return false; });
-        let fields = supports.field_count() as usize;
+        let fields = connectivity.field_count() as usize;
         let mut holds = vec![false; self.reactions.len()];
         for dof in prescribed {
-            let holder = dof.owner * fields + supports.field_of_node(dof.node) as usize;
+            let holder = dof.owner * fields + connectivity.field_of_node(dof.node) as usize;
             holds.get_mut(holder).into_iter().for_each(|holds| *holds = true);
         }
         self.reactions.iter().zip(holds).any(|(reaction, holds)| *reaction != Reaction::NONE && !holds)
@@ -63,24 +63,24 @@ impl<const D: usize> LastEquilibrium<D> {
         prescribed: &[PrescribedDof],
     ) -> Result<Pooled<Vector<f64, D>>, Inadmissible> {
         let conditions = &step.loads.prescribed;
-        let supports = step.supports;
+        let connectivity = step.connectivity;
         // The contacts of the last equilibrium are those at the start of this step, found anew on the new grid.
         let loads = Loads { contacts: step.loads.contacts.clone(), ..self.loads.clone() };
         mutant!("reference: contact is that of the old grid": loads = self.loads.clone());
         // With dt = 0, laws give the stress at t_n, without a change of internal variables.
         let at_start = Equilibrium::new(Step { loads: &loads, dt: 0.0, ..step }, prescribed);
         mutant!("reference: relaxation within a step is carried over": at_start = Equilibrium::new(Step { loads: &loads, ..step }, prescribed));
-        let still: Pooled<Vector<f64, D>> = supports.field();
-        let mut force: Pooled<Vector<f64, D>> = supports.field();
+        let still: Pooled<Vector<f64, D>> = connectivity.field();
+        let mut force: Pooled<Vector<f64, D>> = connectivity.field();
         at_start.residual_into(Trial::motion(&still), &mut force)?;
-        let fields = supports.field_count() as usize;
+        let fields = connectivity.field_count() as usize;
         for number in 0..conditions.len() * fields {
             let condition = &conditions[number / fields];
-            let holder = |dof: &&PrescribedDof| dof.owner * fields + supports.field_of_node(dof.node) as usize;
+            let holder = |dof: &&PrescribedDof| dof.owner * fields + connectivity.field_of_node(dof.node) as usize;
             let dofs: Vec<_> = prescribed.iter().filter(|dof| holder(dof) == number).collect();
             // The moment is m = Σ arm · r.
             let arm = |dof: &PrescribedDof| {
-                let x = supports.grid().position(supports.grid().index(supports.active().id(dof.node)));
+                let x = connectivity.grid().position(connectivity.grid().index(connectivity.active().id(dof.node)));
                 condition.rotation().map_or(0.0, |rotation| rotation.moment(&x, dof.component, 1.0))
             };
             // A new condition has no reaction.

@@ -1,14 +1,14 @@
 //! The nodal fields of the active nodes, and the lattice in which these fields lie side by side.
 
-use super::supports::Supports;
+use super::connectivity::Connectivity;
 
-/// The distance between neighbouring fields in a [lattice](Supports::in_lattice), in cells. It is even on coarser grids of multigrid, down to
+/// The distance between neighbouring fields in a [lattice](Connectivity::in_lattice), in cells. It is even on coarser grids of multigrid, down to
 /// one cell.
 pub(crate) fn stride(cells: u32) -> u64 {
     8 * (u64::from(cells) + 1).next_power_of_two()
 }
 
-impl<const D: usize> Supports<D> {
+impl<const D: usize> Connectivity<D> {
     /// The number of nodal fields.
     pub(crate) fn field_count(&self) -> u32 {
         self.fields.iter().max().map_or(1, |last| last + 1)

@@ -30,6 +30,7 @@ mod block;
 mod blocks;
 mod builder;
 mod columns;
+mod connectivity;
 mod fields;
 mod foreign;
 mod group;
@@ -45,18 +46,17 @@ mod plain;
 mod points;
 mod regions;
 mod shares;
-mod supports;
 mod tiled;
 
 pub(crate) use blocks::{Quadratic, pair};
 pub(crate) use columns::WIDEST;
+pub use connectivity::Connectivity;
 pub use fields::Fields;
 pub use group::{At, Group};
 pub(crate) use lattice::stride;
 pub use mode::{Mode, Weights};
 pub use number::Number;
-pub use points::{Points, SupportError};
-pub use supports::Supports;
+pub use points::{ConnectivityError, Points};
 
 use block::Block;
 

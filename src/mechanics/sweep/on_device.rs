@@ -1,13 +1,13 @@
 //! The shape functions of all particles as plain arrays, for a device.
 
-use super::Supports;
+use super::Connectivity;
 use super::tiled::Tiled;
 use crate::gpu::{Gpu, Masses, Transfer, TransferArrays};
 use crate::lanes::LANES;
 use std::sync::Arc;
 
-impl<const D: usize> Supports<D> {
-    /// These supports with a device, on which linear systems are solved.
+impl<const D: usize> Connectivity<D> {
+    /// This connectivity with a device, on which linear systems are solved.
     pub(crate) fn with_gpu(mut self, gpu: Option<Arc<Gpu>>) -> Self {
         self.gpu = gpu;
         self
@@ -31,7 +31,7 @@ impl<const D: usize> Supports<D> {
     }
 }
 
-impl<const D: usize> Supports<D> {
+impl<const D: usize> Connectivity<D> {
     /// Bytes of the shape functions on a device, with the boxes of all blocks, and bytes of the memory that the threads of a block share; 0 for
     /// the plain loop.
     pub(crate) fn device_bytes(&self) -> [usize; 2] {

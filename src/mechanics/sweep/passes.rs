@@ -1,9 +1,9 @@
 //! The passes over all particles: the particle-to-grid and grid-to-particle transfers that the rest of the program calls.
 
+use super::connectivity::{Implementation, dispatch};
 use super::group::At;
-use super::supports::{Implementation, dispatch};
 use super::tiled::Tiled;
-use super::{Each, Group, Mode, Number, Quadratic, Supports, Weights};
+use super::{Connectivity, Each, Group, Mode, Number, Quadratic, Weights};
 use crate::lanes::LANES;
 use crate::parallel::{First, Message};
 use crate::pooled::{Element, Pooled};
@@ -11,7 +11,7 @@ use crate::tensor::{Tensor, Vector};
 use bytemuck::Pod;
 use num_traits::Zero;
 
-impl<const D: usize> Supports<D> {
+impl<const D: usize> Connectivity<D> {
     /// `f_I += Σ_p q N_I + σ ∇_r N_I` for C components: 1 or D. `point(group, u and L, q and σ)` adds to q and σ, which begin with
     /// zero. Without a field u and L are unspecified.
     pub fn sweep<T: Number, const C: usize>(
@@ -82,21 +82,21 @@ impl<const D: usize> Supports<D> {
     /// ∇u_p = Σ u_I ⊗ ∇_r N_I. The scatter has the given weights in place of N and ∇_r N.
     ///
     /// ```
-    /// use bfree::mechanics::{check::direction, residual::Inadmissible, sweep::{Supports, Weights}};
+    /// use bfree::mechanics::{check::direction, residual::Inadmissible, sweep::{Connectivity, Weights}};
     /// use bfree::tensor::{Tensor, Vector, contract};
     ///
     /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
     /// let simulation = scene.build::<2>("scenes".as_ref())?;
     /// let (particles, grid) = (&simulation.particles, &simulation.grid);
-    /// let (supports, nodes) = Supports::new(&simulation.approximation, grid, &particles.position)?;
+    /// let (connectivity, nodes) = Connectivity::new(&simulation.approximation, grid, &particles.position)?;
     /// // Virtual work: Σ_I f_I·w_I = Σ_p (σ_p : ∇w_p + q_p·w_p), for forces f and any w.
     /// let (u, w) = (direction::<2>(nodes.len(), 1), direction::<2>(nodes.len(), 2));
     /// let state = |u: Vector<f64, 2>, gradient: Tensor<f64, 2>| (u * 3.0, gradient * 2.0);
     /// let mut force = vec![Vector::zeros(); nodes.len()];
-    /// supports.assemble(&u, Weights::Signed, &mut force, |_, u, gradient| Ok::<_, Inadmissible>(state(u, gradient)))?;
+    /// connectivity.assemble(&u, Weights::Signed, &mut force, |_, u, gradient| Ok::<_, Inadmissible>(state(u, gradient)))?;
     /// let at_nodes: f64 = force.iter().zip(&w).map(|(f, w)| f.dot(w)).sum();
-    /// let states = supports.interpolate(&u, |_, u, gradient| Ok::<_, Inadmissible>(state(u, gradient)))?;
-    /// let work = supports.interpolate(&w, |p, w, gradient| {
+    /// let states = connectivity.interpolate(&u, |_, u, gradient| Ok::<_, Inadmissible>(state(u, gradient)))?;
+    /// let work = connectivity.interpolate(&w, |p, w, gradient| {
     ///     let (q, sigma) = states[p];
     ///     Ok::<_, Inadmissible>(contract(&sigma, &gradient) + q.dot(&w))
     /// })?;
@@ -105,8 +105,8 @@ impl<const D: usize> Supports<D> {
     /// // A uniform pressure acts on the rim of a body. Inside, the forces of the particles around a node cancel, but their sizes do not.
     /// let pressure = |_: usize, _: Vector<f64, 2>, _: Tensor<f64, 2>| Ok::<_, Inadmissible>((Vector::zeros(), Tensor::identity()));
     /// let (mut force, mut size) = (vec![Vector::zeros(); nodes.len()], vec![Vector::zeros(); nodes.len()]);
-    /// supports.assemble(&u, Weights::Signed, &mut force, pressure)?;
-    /// supports.assemble(&u, Weights::Magnitude, &mut size, pressure)?;
+    /// connectivity.assemble(&u, Weights::Signed, &mut force, pressure)?;
+    /// connectivity.assemble(&u, Weights::Magnitude, &mut size, pressure)?;
     /// assert!(force.iter().zip(&size).all(|(f, size)| f.norm() <= size.norm() * (1.0 + 1e-15)));
     /// let inside = nodes.number(grid.id([5, 5])).ok_or("in the middle of the disc")?;
     /// assert!(force[inside].norm() < 1e-3 * size[inside].norm());
@@ -166,7 +166,7 @@ impl<const D: usize> Supports<D> {
 
     /// Σ u_I N_I at every particle.
     ///
-    /// Example: [`Supports`].
+    /// Example: [`Connectivity`].
     pub fn values<const C: usize>(&self, field: &[Vector<f64, C>]) -> Pooled<Vector<f64, C>>
     where
         Vector<f64, C>: Element,
@@ -216,10 +216,10 @@ impl<const D: usize> Supports<D> {
     /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
     /// let simulation = scene.build::<2>("scenes".as_ref())?;
     /// let (particles, grid) = (&simulation.particles, &simulation.grid);
-    /// let (supports, nodes) = bfree::mechanics::sweep::Supports::new(&simulation.approximation, grid, &particles.position)?;
+    /// let (connectivity, nodes) = bfree::mechanics::sweep::Connectivity::new(&simulation.approximation, grid, &particles.position)?;
     /// // A rotation about the origin, u = ω × x, has no divergence.
     /// let rotation: Vec<_> = nodes.positions(grid).map(|(_, x)| bfree::tensor::Vector::from([-x[1], x[0]])).collect();
-    /// let divergence = supports.evaluate(&rotation, |_, _, gradient| gradient.trace());
+    /// let divergence = connectivity.evaluate(&rotation, |_, _, gradient| gradient.trace());
     /// assert_eq!(divergence.len(), particles.len());
     /// assert!(divergence.iter().all(|one| one.abs() < 1e-12));
     /// # Ok::<(), Box<dyn std::error::Error>>(())

@@ -35,7 +35,7 @@ impl<const D: usize> Tiled<D> {
         self.own().iter().map(numbers).sum::<usize>() * size_of::<f64>()
     }
 
-    /// [`super::Supports::sweep`] for `fields` fields of C components side by side. Without a field nothing is gathered.
+    /// [`super::Connectivity::sweep`] for `fields` fields of C components side by side. Without a field nothing is gathered.
     pub(super) fn sweep<const C: usize>(
         &self,
         fields: usize,

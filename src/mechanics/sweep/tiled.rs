@@ -10,7 +10,7 @@ use super::foreign::Foreign;
 use super::group::Group;
 use super::numbering::number;
 use super::order::{self, Key};
-use super::points::{Points, SupportError};
+use super::points::{ConnectivityError, Points};
 use super::shares::Shares;
 use crate::approximation::{ApproximationError, Scratch, Separable, ShapeFunction, Support};
 use crate::grid::Grid;
@@ -44,7 +44,7 @@ pub(super) struct Tiled<const D: usize> {
 }
 
 impl<const D: usize> Tiled<D> {
-    /// [`super::Supports::new`] for a shape function that is a product. The arrays lie in the memory of `reused`, and sorting begins with the order of its particles.
+    /// [`super::Connectivity::new`] for a shape function that is a product. The arrays lie in the memory of `reused`, and sorting begins with the order of its particles.
     pub(super) fn new<A: ShapeFunction>(
         approximation: &A,
         product: &dyn Separable,
@@ -52,7 +52,7 @@ impl<const D: usize> Tiled<D> {
         points: &Points<'_, D>,
         reused: Option<Self>,
         pool: &Pool,
-    ) -> Result<(Self, Nodes), SupportError> {
+    ) -> Result<(Self, Nodes), ConnectivityError> {
         let positions = &*points.positions;
         let outside = || ApproximationError::Outside { position: Vec::new(), lower: Vec::new(), upper: Vec::new() };
         // Threads meet errors in any order. So the particle with the smallest id is searched, with the error for its whole position.
@@ -61,7 +61,7 @@ impl<const D: usize> Tiled<D> {
             let mut error = |x: &Vector<f64, D>| approximation.evaluate(grid, x, &mut scratch, &mut support).err();
             let failing = positions.iter().enumerate().filter_map(|(p, x)| Some((points.id(p), error(x)?)));
             let (particle, source) = failing.min_by_key(|&(id, _)| id).unwrap_or((points.id(particle), source));
-            SupportError { particle, source }
+            ConnectivityError { particle, source }
         };
         let Self { mut blocks, mut ranges, slots, keys, .. } = reused.unwrap_or_default();
         let keys = order::sorted(grid, points, keys).map_err(|particle| failure(particle, outside()))?;
@@ -137,7 +137,7 @@ impl<const D: usize> Tiled<D> {
             ..own.last().map_or(0, |last| last.start as usize + last.count())
     }
 
-    /// See [`super::Supports::own_particles`].
+    /// See [`super::Connectivity::own_particles`].
     pub(super) fn own_particles(&self) -> Range<usize> {
         if self.is_memory_order { self.own_places() } else { 0..self.particles() }
     }

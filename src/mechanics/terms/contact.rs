@@ -26,7 +26,7 @@ pub(crate) struct ContactForce<'a, const D: usize, L> {
 impl<'a, const D: usize, L: Law> ContactForce<'a, D, L> {
     pub(crate) fn of(step: &Step<'a, D, L>) -> Option<Self> {
         let acts = step.loads.contacts.exist();
-        acts.then(|| Self { step: *step, stiffness: penalties(step.bodies, step.supports.grid().spacing) })
+        acts.then(|| Self { step: *step, stiffness: penalties(step.bodies, step.connectivity.grid().spacing) })
     }
 
     /// All points in contact at φ.
@@ -51,13 +51,13 @@ impl<'a, const D: usize, L: Law> ContactForce<'a, D, L> {
         &'x self,
         phi: &'x [Vector<T, D>],
     ) -> Surroundings<'x, impl Fn(usize) -> f64, impl Fn(&Carrier<D>) -> Vector<T, D>, D> {
-        let Step { particles, supports, time, alphas, .. } = self.step;
+        let Step { particles, connectivity, time, alphas, .. } = self.step;
         let reference = particles.reference().position;
         Surroundings {
             t: time,
             start: alphas.discrete_gradient.then_some((time - alphas.dt, &*particles.position)),
             stiffness: |p: usize| self.stiffness[particles.body[p] as usize],
-            position: move |carrier: &Carrier<D>| carrier.position(reference, supports, phi),
+            position: move |carrier: &Carrier<D>| carrier.position(reference, connectivity, phi),
         }
     }
 
@@ -94,9 +94,9 @@ impl<'a, const D: usize, L: Law> ContactForce<'a, D, L> {
     }
 
     fn free_balance<'x>(&self, body: &'x RigidBody<D>) -> FreeBalance<'x, D> {
-        let Step { alphas, loads, time, supports, .. } = self.step;
+        let Step { alphas, loads, time, connectivity, .. } = self.step;
         let gravity = loads.gravity.as_ref().map_or_else(Vector::zeros, |gravity| gravity.at(time));
-        FreeBalance { body, alphas, gravity, spacing: supports.grid().spacing }
+        FreeBalance { body, alphas, gravity, spacing: connectivity.grid().spacing }
     }
 }
 
@@ -116,7 +116,7 @@ impl<const D: usize, L: Law> Term<D> for ContactForce<'_, D, L> {
             mutant!("contact: the force does not turn with the obstacle": force = one.law.traction(&one.y) * T::lit(one.area));
             for carrier in &one.carriers {
                 carrier
-                    .weights(self.step.supports)
+                    .weights(self.step.connectivity)
                     .for_each(|(node, n)| out[node] -= force * T::lit(carrier.share * n));
             }
         }
@@ -135,31 +135,33 @@ impl<const D: usize, L: Law> Term<D> for ContactForce<'_, D, L> {
             let force = one.force();
             for carrier in &one.carriers {
                 let share = carrier.share.abs();
-                carrier.weights(self.step.supports).for_each(|(node, n)| out[node] += force.abs() * (share * n.abs()));
+                carrier
+                    .weights(self.step.connectivity)
+                    .for_each(|(node, n)| out[node] += force.abs() * (share * n.abs()));
             }
         }
     }
 
     /// The gap changes by the rounding of positions.
     fn add_sensitivity(&self, phi: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) -> Result<(), Inadmissible> {
-        let (supports, reference) = (self.step.supports, self.step.particles.reference().position);
+        let (connectivity, reference) = (self.step.connectivity, self.step.particles.reference().position);
         for ContactRow { carriers, tangent, .. } in self.linearized(phi) {
             let size = |one: &Carrier<D>| {
-                let x = reference[one.particle].abs() + supports.value_at(one.particle, phi).abs();
+                let x = reference[one.particle].abs() + connectivity.value_at(one.particle, phi).abs();
                 x * one.share.abs()
             };
             let change = tangent.abs() * carriers.iter().map(size).sum::<Vector<f64, D>>();
             for carrier in &carriers {
                 let share = carrier.share.abs();
-                carrier.weights(supports).for_each(|(node, n)| out[node] += change * (share * n.abs()));
+                carrier.weights(connectivity).for_each(|(node, n)| out[node] += change * (share * n.abs()));
             }
         }
         Ok(())
     }
 
     fn linearize(&self, at: Trial<'_, f64, D>, _: Part, into: &mut Linearized<D>) -> Result<(), Inadmissible> {
-        let Step { loads, supports, .. } = self.step;
-        into.contacts = ContactRows::new(self.linearized(at.phi), loads.contacts.obstacles.len(), supports);
+        let Step { loads, connectivity, .. } = self.step;
+        into.contacts = ContactRows::new(self.linearized(at.phi), loads.contacts.obstacles.len(), connectivity);
         Ok(())
     }
 }

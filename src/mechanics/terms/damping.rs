@@ -42,7 +42,7 @@ impl<'a, const D: usize, L: Law> Damping<'a, D, L> {
     /// The material part of the stiffness at φ_n, the nodal motion since the last grid reset, without U(J) of averaged bodies: the mean stress of
     /// a step without motion lacks U(J), and has the stiffness of the law.
     fn stiffness(step: &Step<'a, D, L>) -> Result<Rows, Inadmissible> {
-        let motion: Vec<_> = step.nodal.moved(step.supports.nodes()).collect();
+        let motion: Vec<_> = step.nodal.moved(step.connectivity.nodes()).collect();
         let averages = step.bodies.iter().any(Body::averages);
         mutant!("damping: particles of averaged cells have the stiffness of U(J)": averages = false);
         let alphas = Alphas { discrete_gradient: averages, ..step.alphas };
@@ -52,7 +52,7 @@ impl<'a, const D: usize, L: Law> Damping<'a, D, L> {
     /// The stiffness of averaged cells against a change of volume at φ_n.
     fn stiffness_of_cells(step: &Step<'a, D, L>) -> Option<CellRows<D>> {
         mutant!("damping: averaged cells have no stiffness of their own": { return None; });
-        let motion: Vec<_> = step.nodal.moved(step.supports.nodes()).collect();
+        let motion: Vec<_> = step.nodal.moved(step.connectivity.nodes()).collect();
         let alphas = Alphas { discrete_gradient: false, ..step.alphas };
         Some(MeanDilatation::of(&Step { alphas, ..*step })?.volumetric_stiffness(&motion))
     }

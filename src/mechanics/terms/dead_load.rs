@@ -21,7 +21,7 @@ impl<const D: usize> DeadLoad<D> {
         if loads.gravity.is_none() && loads.field.is_none() {
             return None;
         }
-        let mut force: Pooled<Vector<f64, D>> = step.supports.field();
+        let mut force: Pooled<Vector<f64, D>> = step.connectivity.field();
         if let Some(gravity) = &loads.gravity {
             // Σ_p m b N_I = m_I b: gravity is uniform, so the lumped mass already holds the sum.
             let b = gravity.acceleration * gravity.curve.value(step.time);
@@ -30,7 +30,7 @@ impl<const D: usize> DeadLoad<D> {
         if let Some(ForceField(field)) = &loads.field {
             let time = step.time;
             let of_particle = |p: usize| field(particles.id[p] as usize, &particles.position[p], time);
-            step.supports.spread(&mut force, |p| of_particle(p) * particles.mass[p]);
+            step.connectivity.spread(&mut force, |p| of_particle(p) * particles.mass[p]);
         }
         Some(Self { name: "body force", role: Role::Loads, force })
     }
@@ -40,11 +40,11 @@ impl<const D: usize> DeadLoad<D> {
         let mut force = None;
         for load in &step.loads.surface {
             let Pressing::Traction(traction) = load.pressing else { continue };
-            let force = force.get_or_insert_with(|| step.supports.field::<Vector<f64, D>>());
+            let force = force.get_or_insert_with(|| step.connectivity.field::<Vector<f64, D>>());
             let traction = traction * load.curve.value(step.time);
             mutant!("loads: a traction has the other sign": traction = -traction);
             for point in &load.points {
-                for (node, n, _) in step.supports.of(point.particle) {
+                for (node, n, _) in step.connectivity.of(point.particle) {
                     force[node] += traction * (point.area * n);
                 }
             }

@@ -100,7 +100,7 @@ impl<'a, const D: usize, L: Law> DilatationOfStep<'a, D, L> {
         if !step.alphas.discrete_gradient {
             return None;
         }
-        let cells = Arc::new(Cells::of(step.particles, step.bodies, step.supports)?);
+        let cells = Arc::new(Cells::of(step.particles, step.bodies, step.connectivity)?);
         let before = cells.changes_now(step.particles);
         Some(Self { step: *step, cells, before })
     }
@@ -115,8 +115,8 @@ impl<'a, const D: usize, L: Law> DilatationOfStep<'a, D, L> {
     }
 
     fn means<T: Number>(&self, phi: &[Vector<T, D>]) -> Vec<Mean<T>> {
-        let Step { particles, supports, .. } = self.step;
-        let grown = supports.evaluate(phi, |p, _, g| {
+        let Step { particles, connectivity, .. } = self.step;
+        let grown = connectivity.evaluate(phi, |p, _, g| {
             let [before, after] = self.ends(p, &g).ends.map(|at| at.j);
             (after - before) * T::lit(particles.volume[p])
         });
@@ -193,8 +193,8 @@ impl<const D: usize, L: Law> Term<D> for DilatationOfStep<'_, D, L> {
         let means = self.means(at.phi);
         let stiffness: Vec<f64> = means.iter().map(|mean| mean.stiffness).collect();
         mutant!("mean dilatation of a step: the product lacks the coupling within a cell": stiffness = vec![0.0; stiffness.len()]);
-        let (cells, layout, supports) = (self.cells.clone(), CellLayout::of_step(D), self.step.supports);
-        into.cells.push(CellRows::new(cells, layout, stiffness, supports, at.phi, |cell, p, g, lane, rows| {
+        let (cells, layout, connectivity) = (self.cells.clone(), CellLayout::of_step(D), self.step.connectivity);
+        into.cells.push(CellRows::new(cells, layout, stiffness, connectivity, at.phi, |cell, p, g, lane, rows| {
             self.linearize_at(p, g, means[cell].pressure, lane, rows);
         }));
         Ok(())

@@ -29,8 +29,8 @@ impl<'a, const D: usize> Inertia<'a, D> {
         }
         let mut predicted = Pooled::default();
         if mass.lumping < 1.0 {
-            let of_nodes = mass.supports.pool().collect(nodal.predicted(&alphas));
-            predicted = mass.supports.values(&of_nodes);
+            let of_nodes = mass.connectivity.pool().collect(nodal.predicted(&alphas));
+            predicted = mass.connectivity.values(&of_nodes);
         }
         Some(Self { mass, nodal, alphas, predicted })
     }
@@ -79,7 +79,7 @@ impl<const D: usize> Term<D> for Inertia<'_, D> {
                 let u = u - self.predicted[p].map(T::lit);
                 half_a1 * T::lit(self.mass.consistent(p)) * u.dot(&u)
             };
-            let of_particles = summed(self.mass.supports.evaluate(phi, energy));
+            let of_particles = summed(self.mass.connectivity.evaluate(phi, energy));
             sum += of_particles.0;
             magnitude += of_particles.1;
         }

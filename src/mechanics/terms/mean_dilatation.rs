@@ -99,7 +99,7 @@ impl<'a, const D: usize, L: Law> MeanDilatation<'a, D, L> {
         if step.alphas.discrete_gradient {
             return None;
         }
-        let cells = Cells::of(step.particles, step.bodies, step.supports)?;
+        let cells = Cells::of(step.particles, step.bodies, step.connectivity)?;
         Some(Self { step: *step, cells: Arc::new(cells) })
     }
 
@@ -112,7 +112,7 @@ impl<'a, const D: usize, L: Law> MeanDilatation<'a, D, L> {
     }
 
     fn states<T: Number>(&self, at: Trial<'_, T, D>) -> Vec<State<T>> {
-        let changes = self.cells.changes_at(self.step.particles, self.step.supports, at);
+        let changes = self.cells.changes_at(self.step.particles, self.step.connectivity, at);
         let state = |((members, volume), change)| State::of(&self.step, members, volume, change);
         self.cells.iter().zip(changes).map(state).collect()
     }
@@ -129,7 +129,7 @@ impl<const D: usize, L: Law> MeanDilatation<'_, D, L> {
     ) -> CellRows<D> {
         let closed = Form::Closed.rows(D);
         let (cells, layout) = (self.cells.clone(), CellLayout::of_potential(D));
-        CellRows::new(cells, layout, stiffness, self.step.supports, phi, |cell, p, g, lane, rows| {
+        CellRows::new(cells, layout, stiffness, self.step.connectivity, phi, |cell, p, g, lane, rows| {
             let Local { jacobian, response, a } = self.local(p, g);
             for i in 0..D {
                 for k in 0..D {
@@ -157,8 +157,8 @@ impl<const D: usize, L: Law> MeanDilatation<'_, D, L> {
 
     /// The cells of the mixed form, with γ = k₀/v and k₀ = κ G/(κ + G).
     fn mixed_cells(&self, states: &[State<f64>], rows: &CellRows<D>) -> Vec<MixedCell<D>> {
-        let Step { particles, supports, .. } = self.step;
-        let (grid, reference) = (supports.grid(), particles.reference());
+        let Step { particles, connectivity, .. } = self.step;
+        let (grid, reference) = (connectivity.grid(), particles.reference());
         let cell = |(members, reference_volume): (&[Member], f64), state: &State<f64>, scale: &Scale, id: u64| {
             let volume = (1.0 + state.change) * reference_volume;
             let (mut volume_gradient, mut centroid) = (Tensor::zeros(), Vector::zeros());
@@ -169,7 +169,7 @@ impl<const D: usize, L: Law> MeanDilatation<'_, D, L> {
             }
             let bulk = (state.stiffness * volume).max(SOFTEST * scale.shear);
             MixedCell {
-                field: supports.field_of(particles.body[members[0].particle as usize]),
+                field: connectivity.field_of(particles.body[members[0].particle as usize]),
                 index: grid.index(id),
                 centroid,
                 volume,
@@ -190,9 +190,9 @@ impl<const D: usize, L: Law> MeanDilatation<'_, D, L> {
         if at.dilatation.is_empty() {
             return Vec::new();
         }
-        let Step { particles, supports, .. } = self.step;
-        let of_motion = self.cells.changes(particles, supports, at.phi);
-        let own = self.cells.changes_at(particles, supports, at);
+        let Step { particles, connectivity, .. } = self.step;
+        let of_motion = self.cells.changes(particles, connectivity, at.phi);
+        let own = self.cells.changes_at(particles, connectivity, at);
         let cells = self.cells.iter().zip(&self.cells.scales).zip(of_motion.into_iter().zip(own));
         mutant!("mixed: the residual of a cell is that of half its volume": { return cells.map(|(((_, volume), scale), (motion, own))| (motion - own) * T::lit(0.5 * scale.force * volume)).collect(); });
         cells.map(|(((_, volume), scale), (motion, own))| (motion - own) * T::lit(scale.force * volume)).collect()
@@ -235,9 +235,9 @@ impl<const D: usize, L: Law> Term<D> for MeanDilatation<'_, D, L> {
     }
 
     fn energy<T: Number>(&self, phi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>> {
-        let Step { particles, supports, .. } = self.step;
+        let Step { particles, connectivity, .. } = self.step;
         let states = self.states(Trial::motion(phi));
-        let energies = supports.evaluate(phi, |p, _, g| {
+        let energies = connectivity.evaluate(phi, |p, _, g| {
             let Some(cell) = self.cells.cell(p as u32) else { return [T::zero(); 2] };
             let volume = T::lit(particles.volume[p]);
             let (mean, own) = (at_mean(&self.step, p, states[cell].change), self.local(p, &g).response);

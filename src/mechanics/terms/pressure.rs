@@ -5,7 +5,7 @@ use crate::mechanics::constitutive::Part;
 use crate::mechanics::kinematics::{Inadmissible, Kinematics};
 use crate::mechanics::linearized::{Linearized, PressureRow};
 use crate::mechanics::loads::PressurePoint;
-use crate::mechanics::sweep::{Number, Supports};
+use crate::mechanics::sweep::{Connectivity, Number};
 use crate::mechanics::trial::Trial;
 use crate::particles::Particles;
 use crate::tensor::{Vector, cofactor, identity};
@@ -13,14 +13,14 @@ use crate::tensor::{Vector, cofactor, identity};
 /// Σ_Γ p cof(F) N A N_I, which has no potential.
 pub(crate) struct Pressure<'a, const D: usize> {
     particles: &'a Particles<D>,
-    supports: &'a Supports<D>,
+    connectivity: &'a Connectivity<D>,
     points: Vec<PressurePoint<D>>,
 }
 
 impl<'a, const D: usize> Pressure<'a, D> {
     pub(super) fn of<L>(step: &Step<'a, D, L>) -> Option<Self> {
         let points = step.loads.pressures(step.time);
-        (!points.is_empty()).then_some(Self { particles: step.particles, supports: step.supports, points })
+        (!points.is_empty()).then_some(Self { particles: step.particles, connectivity: step.connectivity, points })
     }
 }
 
@@ -35,10 +35,10 @@ impl<const D: usize> Term<D> for Pressure<'_, D> {
 
     fn add_at_nodes<T: Number>(&self, phi: &[Vector<T, D>], out: &mut [Vector<T, D>]) {
         for point in &self.points {
-            let g = self.supports.gradient_at(point.particle, phi);
+            let g = self.connectivity.gradient_at(point.particle, phi);
             let f = identity::<T, D>() + Kinematics(self.particles).displacement_gradient(point.particle, &g);
             let force = cofactor(&f) * point.force.map(T::lit);
-            for (node, n, _) in self.supports.of(point.particle) {
+            for (node, n, _) in self.connectivity.of(point.particle) {
                 out[node] += force * T::lit(n);
             }
         }
@@ -50,7 +50,7 @@ impl<const D: usize> Term<D> for Pressure<'_, D> {
 
     fn add_magnitudes_at_nodes(&self, _: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
         for point in &self.points {
-            for (node, n, _) in self.supports.of(point.particle) {
+            for (node, n, _) in self.connectivity.of(point.particle) {
                 out[node] += point.force.abs() * n.abs();
             }
         }
@@ -61,7 +61,7 @@ impl<const D: usize> Term<D> for Pressure<'_, D> {
             let p = point.particle;
             PressureRow {
                 particle: p,
-                delta_f: identity::<f64, D>() + self.supports.gradient_at(p, at.phi),
+                delta_f: identity::<f64, D>() + self.connectivity.gradient_at(p, at.phi),
                 force: cofactor(&Kinematics(self.particles).reference(p)) * point.force,
             }
         };

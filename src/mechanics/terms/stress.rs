@@ -6,7 +6,7 @@ use crate::material::Law;
 use crate::mechanics::constitutive::{Laws, Part};
 use crate::mechanics::kinematics::{Inadmissible, Kinematics};
 use crate::mechanics::linearized::{Linearized, Rows};
-use crate::mechanics::sweep::{Mode, Number, Supports, Weights};
+use crate::mechanics::sweep::{Connectivity, Mode, Number, Weights};
 use crate::mechanics::trial::Trial;
 use crate::parallel::First;
 use crate::tensor::{Tensor, Vector};
@@ -14,13 +14,13 @@ use crate::tensor::{Tensor, Vector};
 /// Σ_p V₀ F S F_rᵀ ∇_r N_I
 pub(crate) struct Stress<'a, const D: usize, L> {
     laws: Laws<'a, D, L>,
-    supports: &'a Supports<D>,
+    connectivity: &'a Connectivity<D>,
 }
 
 impl<'a, const D: usize, L: Law> Stress<'a, D, L> {
     pub(super) fn of(step: &Step<'a, D, L>) -> Self {
-        let Step { particles, bodies, dt, supports, alphas, .. } = *step;
-        Self { laws: Laws { particles, bodies, dt, discrete_gradient: alphas.discrete_gradient }, supports }
+        let Step { particles, bodies, dt, connectivity, alphas, .. } = *step;
+        Self { laws: Laws { particles, bodies, dt, discrete_gradient: alphas.discrete_gradient }, connectivity }
     }
 
     fn law(&self, p: usize) -> &L {
@@ -31,16 +31,16 @@ impl<'a, const D: usize, L: Law> Stress<'a, D, L> {
     pub(super) fn linearized(&self, phi: &[Vector<f64, D>], part: Part) -> Result<Rows, Inadmissible> {
         let form = self.laws.form();
         let count = form.rows(D);
-        let own = self.supports.own_groups();
-        let mut rows = self.supports.pool().unspecified(own.len() * count, [0.0; LANES]);
+        let own = self.connectivity.own_groups();
+        let mut rows = self.connectivity.pool().unspecified(own.len() * count, [0.0; LANES]);
         let evaluate = self.laws.tangents(part, form);
         let failure = First::none();
-        self.supports.fill_rows(phi, count, &mut rows, |group, at, rows| {
+        self.connectivity.fill_rows(phi, count, &mut rows, |group, at, rows| {
             if let Err(error) = evaluate(group, at, rows) {
                 failure.keep(error.particle, error);
             }
         });
-        failure.check(self.supports.processes())?;
+        failure.check(self.connectivity.processes())?;
         Ok(Rows::new(form, own.start, count, rows))
     }
 }
@@ -63,7 +63,7 @@ impl<const D: usize, L: Law> Term<D> for Stress<'_, D, L> {
             return None;
         }
         let particles = self.laws.particles;
-        let energies = self.supports.interpolate(phi, |p, _, g| {
+        let energies = self.connectivity.interpolate(phi, |p, _, g| {
             let at = Kinematics(particles).state(p, &g, self.laws.dt)?;
             mutant!("stress: the energy lacks V_0": { return Ok(self.law(p).energy(&at)); });
             Ok(T::lit(particles.volume[p]) * self.law(p).energy(&at))
@@ -74,10 +74,10 @@ impl<const D: usize, L: Law> Term<D> for Stress<'_, D, L> {
     /// ‖δP‖ ≤ ‖F‖ ‖ℂ : Fᵀ δF‖ with ‖δF‖ = ‖H‖ + Σ |φ| |∇_r N| ‖F_r‖. The response to a change of volume stands for all δF.
     fn add_sensitivity(&self, phi: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) -> Result<(), Inadmissible> {
         let particles = self.laws.particles;
-        self.supports.assemble(phi, Weights::Magnitude, out, |p, _, g| {
+        self.connectivity.assemble(phi, Weights::Magnitude, out, |p, _, g| {
             let at = Kinematics(particles).state(p, &g, self.laws.dt)?;
             let f_r = Kinematics(particles).reference(p).norm();
-            let moved: f64 = self.supports.of(p).map(|(node, _, grad_r)| phi[node].norm() * grad_r.norm()).sum();
+            let moved: f64 = self.connectivity.of(p).map(|(node, _, grad_r)| phi[node].norm() * grad_r.norm()).sum();
             let response = self.law(p).elasticity(&at, &(at.f.transpose() * at.f)).norm();
             let change = response * (at.h.norm() + moved * f_r) * f_r * particles.volume[p];
             Ok((Vector::zeros(), Tensor::repeat(change)))

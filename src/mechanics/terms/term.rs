@@ -6,7 +6,7 @@ use crate::mechanics::linearized::Linearized;
 use crate::mechanics::loads::{Loads, Pose};
 use crate::mechanics::mass::Mass;
 use crate::mechanics::schemes::Alphas;
-use crate::mechanics::sweep::{At, Group, Mode, Number, Supports};
+use crate::mechanics::sweep::{At, Connectivity, Group, Mode, Number};
 use crate::mechanics::transfer::Nodal;
 use crate::mechanics::trial::Trial;
 use crate::particles::{Body, Particles};
@@ -22,7 +22,7 @@ pub struct Step<'a, const D: usize, L> {
     /// The loads on the bodies.
     pub loads: &'a Loads<D>,
     /// Shape functions, evaluated at the last grid reset.
-    pub supports: &'a Supports<D>,
+    pub connectivity: &'a Connectivity<D>,
     /// State at the nodes.
     pub nodal: &'a Nodal<D>,
     /// The relations of a and v to φ.
@@ -48,8 +48,8 @@ impl<const D: usize, L> Copy for Step<'_, D, L> {}
 impl<'a, const D: usize, L> Step<'a, D, L> {
     /// The mass operator.
     pub(crate) fn mass(&self) -> Mass<'a, D> {
-        let Self { particles, supports, nodal, lumping, .. } = *self;
-        Mass { particles, supports, lumped: &nodal.mass, lumping }
+        let Self { particles, connectivity, nodal, lumping, .. } = *self;
+        Mass { particles, connectivity, lumped: &nodal.mass, lumping }
     }
 }
 

@@ -4,7 +4,7 @@ use crate::mechanics::affine::affine;
 use crate::mechanics::loads::PrescribedDof;
 use crate::mechanics::mass::{Mass, is_light, lumped, restricted};
 use crate::mechanics::schemes::Alphas;
-use crate::mechanics::sweep::Supports;
+use crate::mechanics::sweep::Connectivity;
 use crate::particles::Particles;
 use crate::pooled::Pooled;
 use crate::solver::LinearError;
@@ -17,20 +17,20 @@ use serde::{Deserialize, Serialize};
 /// it.
 ///
 /// ```
-/// use bfree::mechanics::{check::direction, sweep::Supports, transfer::Nodal};
+/// use bfree::mechanics::{check::direction, sweep::Connectivity, transfer::Nodal};
 /// use bfree::tensor::Vector;
 ///
 /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
 /// let mut simulation = scene.build::<2>("scenes".as_ref())?;
 /// let particles = &mut simulation.particles;
 /// particles.velocity = direction(particles.len(), 1);
-/// let (supports, _) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
+/// let (connectivity, _) = Connectivity::new(&simulation.approximation, &simulation.grid, &particles.position)?;
 /// let momentum = |nodal: &Nodal<2>| nodal.mass.iter().zip(&nodal.velocity).map(|(&m, v)| v * m).sum::<Vector<f64, 2>>();
 /// // Mass and momentum are those of the particles, for the lumped and for the consistent mass.
-/// let rest = Nodal::at_rest(particles, &supports);
+/// let rest = Nodal::at_rest(particles, &connectivity);
 /// assert!((rest.mass.iter().sum::<f64>() / particles.mass.iter().sum::<f64>() - 1.0).abs() < 1e-14);
-/// let lumped = Nodal::project(particles, &supports, 1.0)?;
-/// let consistent = Nodal::project(particles, &supports, 0.1)?;
+/// let lumped = Nodal::project(particles, &connectivity, 1.0)?;
+/// let consistent = Nodal::project(particles, &connectivity, 0.1)?;
 /// assert!((momentum(&lumped) - particles.momentum()).norm() < 1e-13);
 /// assert!((momentum(&consistent) - particles.momentum()).norm() < 1e-10);
 /// assert!(lumped.iterations == 0 && consistent.iterations > 0);
@@ -58,9 +58,13 @@ impl<const D: usize> Nodal<D> {
     ///
     /// # Errors
     /// The projection overflows, because particle velocities are too large.
-    pub fn project(particles: &Particles<D>, supports: &Supports<D>, lumping: f64) -> Result<Self, LinearError> {
-        let lumped = lumped(particles, supports);
-        let mass = Mass { particles, supports, lumped: &lumped, lumping };
+    pub fn project(
+        particles: &Particles<D>,
+        connectivity: &Connectivity<D>,
+        lumping: f64,
+    ) -> Result<Self, LinearError> {
+        let lumped = lumped(particles, connectivity);
+        let mass = Mass { particles, connectivity, lumped: &lumped, lumping };
         let ([velocity, acceleration], iterations) = mass.project([&particles.velocity, &particles.acceleration])?;
         Ok(Self { mass: lumped, velocity, acceleration, iterations, ..Self::default() })
     }
@@ -68,7 +72,7 @@ impl<const D: usize> Nodal<D> {
     /// The lumped mass, and velocity and acceleration by [`Projection::Affine`].
     ///
     /// ```
-    /// use bfree::mechanics::{check::direction, sweep::Supports, transfer::Nodal};
+    /// use bfree::mechanics::{check::direction, sweep::Connectivity, transfer::Nodal};
     /// use bfree::tensor::Vector;
     ///
     /// let linear = r#"approximation="linear""#.parse()?;
@@ -76,18 +80,18 @@ impl<const D: usize> Nodal<D> {
     /// let mut simulation = scene.build::<2>("scenes".as_ref())?;
     /// let particles = &mut simulation.particles;
     /// particles.velocity = direction(particles.len(), 1);
-    /// let (supports, _) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
+    /// let (connectivity, _) = Connectivity::new(&simulation.approximation, &simulation.grid, &particles.position)?;
     /// // The momentum is that of the particles.
-    /// let nodal = Nodal::fit(particles, &supports);
+    /// let nodal = Nodal::fit(particles, &connectivity);
     /// let momentum: Vector<f64, 2> = nodal.mass.iter().zip(&nodal.velocity).map(|(&m, v)| v * m).sum();
     /// assert!((momentum - particles.momentum()).norm() < 1e-12);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn fit(particles: &Particles<D>, supports: &Supports<D>) -> Self {
-        let mass = lumped(particles, supports);
-        let mut fields = affine(particles, supports, &mass, [&particles.velocity, &particles.acceleration]);
+    pub fn fit(particles: &Particles<D>, connectivity: &Connectivity<D>) -> Self {
+        let mass = lumped(particles, connectivity);
+        let mut fields = affine(particles, connectivity, &mass, [&particles.velocity, &particles.acceleration]);
         // E û with the same momentum as u: Eᵀ m û = Eᵀ (m u).
-        let space = supports.space([]);
+        let space = connectivity.space([]);
         for u in fields.iter_mut().filter(|_| !space.followers().is_empty()) {
             u.iter_mut().zip(&mass).for_each(|(u, &m)| *u *= m);
             divide(particles, &space, &mass, u);
@@ -97,14 +101,14 @@ impl<const D: usize> Nodal<D> {
     }
 
     /// The lumped mass; velocity and acceleration are zero.
-    pub fn at_rest(particles: &Particles<D>, supports: &Supports<D>) -> Self {
-        let still: Pooled<Vector<f64, D>> = supports.field();
-        Self { velocity: still.clone(), acceleration: still, ..Self::mass_alone(particles, supports) }
+    pub fn at_rest(particles: &Particles<D>, connectivity: &Connectivity<D>) -> Self {
+        let still: Pooled<Vector<f64, D>> = connectivity.field();
+        Self { velocity: still.clone(), acceleration: still, ..Self::mass_alone(particles, connectivity) }
     }
 
     /// The lumped mass alone, which gravity acts on: there is no inertia.
-    pub(crate) fn mass_alone(particles: &Particles<D>, supports: &Supports<D>) -> Self {
-        Self { mass: lumped(particles, supports), ..Self::default() }
+    pub(crate) fn mass_alone(particles: &Particles<D>, connectivity: &Connectivity<D>) -> Self {
+        Self { mass: lumped(particles, connectivity), ..Self::default() }
     }
 
     /// Whether there is no inertia.
@@ -127,25 +131,30 @@ impl<const D: usize> Nodal<D> {
     /// a_I = −R_I / m_I, with R the residual of this state without acceleration.
     ///
     /// ```
-    /// use bfree::mechanics::{sweep::Supports, transfer::Nodal};
+    /// use bfree::mechanics::{sweep::Connectivity, transfer::Nodal};
     /// use bfree::tensor::Vector;
     ///
     /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
     /// let simulation = scene.build::<2>("scenes".as_ref())?;
     /// let particles = &simulation.particles;
-    /// let (supports, _) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
-    /// let mut nodal = Nodal::at_rest(particles, &supports);
+    /// let (connectivity, _) = Connectivity::new(&simulation.approximation, &simulation.grid, &particles.position)?;
+    /// let mut nodal = Nodal::at_rest(particles, &connectivity);
     /// // An undeformed body under gravity: R_I = −m_I g, and all of it begins to fall.
     /// let g = Vector::from([0.0, -10.0]);
     /// let unbalanced: Vec<_> = nodal.mass.iter().map(|&m| g * -m).collect();
-    /// nodal.accelerate(particles, &supports, &unbalanced);
+    /// nodal.accelerate(particles, &connectivity, &unbalanced);
     /// assert!(nodal.acceleration.iter().all(|a| (a - g).norm() < 1e-14));
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn accelerate(&mut self, particles: &Particles<D>, supports: &Supports<D>, unbalanced: &[Vector<f64, D>]) {
+    pub fn accelerate(
+        &mut self,
+        particles: &Particles<D>,
+        connectivity: &Connectivity<D>,
+        unbalanced: &[Vector<f64, D>],
+    ) {
         self.acceleration.iter_mut().zip(unbalanced).for_each(|(a, r)| *a = -r);
         mutant!("transfer: loads at t = 0 push the wrong way": { self.acceleration.iter_mut().for_each(|a| *a = -*a); });
-        divide(particles, &supports.space([]), &self.mass, &mut self.acceleration);
+        divide(particles, &connectivity.space([]), &self.mass, &mut self.acceleration);
     }
 
     /// Applies E to velocity and acceleration, so that outer nodes follow the prescribed values of inner nodes.
@@ -203,11 +212,11 @@ mod tests {
         let scene = crate::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
         let simulation = scene.build::<2>("scenes".as_ref())?;
         let particles = &simulation.particles;
-        let (supports, _) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
-        let alone = Nodal::mass_alone(particles, &supports);
+        let (connectivity, _) = Connectivity::new(&simulation.approximation, &simulation.grid, &particles.position)?;
+        let alone = Nodal::mass_alone(particles, &connectivity);
         assert!((alone.mass.iter().sum::<f64>() / particles.mass.iter().sum::<f64>() - 1.0).abs() < 1e-14);
-        assert!(alone.is_static() && !Nodal::at_rest(particles, &supports).is_static());
-        let projected = Nodal::project(particles, &supports, 1.0)?;
+        assert!(alone.is_static() && !Nodal::at_rest(particles, &connectivity).is_static());
+        let projected = Nodal::project(particles, &connectivity, 1.0)?;
         let wall = PrescribedDof { node: 3, component: 0, owner: 0, moving: false, step: MotionStep::default() };
         let nodal = projected.with_prescribed(&[wall]);
         assert_eq!((nodal.velocity[3][0], nodal.velocity[3][1]), (0.0, projected.velocity[3][1]));

@@ -8,7 +8,7 @@ use crate::mechanics::kinematics::{Kinematics, compose};
 use crate::mechanics::loads::PrescribedDof;
 use crate::mechanics::schemes::Alphas;
 use crate::mechanics::smoothing::Smoothing;
-use crate::mechanics::sweep::Supports;
+use crate::mechanics::sweep::Connectivity;
 use crate::mechanics::trial::Trial;
 use crate::parallel::{self, First, PART};
 use crate::particles::{Body, Particles};
@@ -43,19 +43,19 @@ pub struct Committed {
 /// The grid-to-particle transfer at the end of a step. The particles stay untouched until [`Self::commit`].
 ///
 /// ```
-/// use bfree::mechanics::{smoothing::Smoothing, sweep::Supports, transfer::{Nodal, Update, WallUpdate}};
+/// use bfree::mechanics::{smoothing::Smoothing, sweep::Connectivity, transfer::{Nodal, Update, WallUpdate}};
 ///
 /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
 /// let mut simulation = scene.build::<2>("scenes".as_ref())?;
 /// let (mut particles, dt) = (simulation.particles.clone(), 0.05);
-/// let (supports, _) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
-/// let nodal = Nodal::project(&particles, &supports, 1.0)?;
+/// let (connectivity, _) = Connectivity::new(&simulation.approximation, &simulation.grid, &particles.position)?;
+/// let nodal = Nodal::project(&particles, &connectivity, 1.0)?;
 /// // The cylinder flies with v = ½ and meets nothing: Δφ = v Δt at every node.
 /// let dphi: Vec<_> = nodal.velocity.iter().map(|v| v * dt).collect();
 /// let alphas = simulation.settings.scheme.end(dt);
 /// let mut update = Update::new(&alphas, &nodal, &nodal, &[], WallUpdate::Literal, &dphi);
-/// update.smooth(&Smoothing::limited(40.0), &particles, &supports, &nodal.mass, dt);
-/// update.commit(&mut particles, &simulation.bodies, &supports, dt);
+/// update.smooth(&Smoothing::limited(40.0), &particles, &connectivity, &nodal.mass, dt);
+/// update.commit(&mut particles, &simulation.bodies, &connectivity, dt);
 /// let flown = particles.position[7] - simulation.particles.position[7] - particles.velocity[7] * dt;
 /// assert!(flown.norm() < 1e-14);
 /// assert!((particles.kinetic_energy() / simulation.particles.kinetic_energy() - 1.0).abs() < 1e-12);
@@ -164,11 +164,17 @@ impl<'a, const D: usize> Update<'a, D> {
     /// over the mass. The error is the difference to Taylor's series with the third derivative ȧ = Δa/Δt: e = c Δt² Δa, exact to leading
     /// order in Δt. The `constant` c is that of the scheme, β − 1/6 for Newmark. A resting wall that leaves the particles' acceleration
     /// alone adds no error, and neither does smoothing.
-    pub(crate) fn local_error(&self, particles: &Particles<D>, supports: &Supports<D>, constant: f64, dt: f64) -> f64 {
+    pub(crate) fn local_error(
+        &self,
+        particles: &Particles<D>,
+        connectivity: &Connectivity<D>,
+        constant: f64,
+        dt: f64,
+    ) -> f64 {
         let mass = &particles.mass;
         let mut squares = 0.0;
         if !self.delta_acceleration.is_empty() {
-            let changes = supports.values(&self.delta_acceleration);
+            let changes = connectivity.values(&self.delta_acceleration);
             squares = mass.iter().zip(&*changes).map(|(m, a)| m * a.norm_squared()).sum();
         }
         constant.abs() * dt * dt * (squares / mass.iter().sum::<f64>()).sqrt()
@@ -179,15 +185,15 @@ impl<'a, const D: usize> Update<'a, D> {
         &mut self,
         smoothing: &Smoothing,
         particles: &Particles<D>,
-        supports: &Supports<D>,
+        connectivity: &Connectivity<D>,
         mass: &[f64],
         dt: f64,
     ) {
         if self.delta_velocity.is_empty() {
             return;
         }
-        let at_kinks = smoothing.shares_at_kinks(particles, supports, mass, dt);
-        let change = |field| smoothing.change(particles, supports, mass, at_kinks.as_deref(), field, dt);
+        let at_kinks = smoothing.shares_at_kinks(particles, connectivity, mass, dt);
+        let change = |field| smoothing.change(particles, connectivity, mass, at_kinks.as_deref(), field, dt);
         self.smoothed = Some([&particles.velocity, &particles.acceleration].map(|field| change(field)));
         mutant!("transfer: smoothing takes the velocity for the acceleration": { self.smoothed = Some([&particles.velocity; 2].map(|field| change(field))); });
     }
@@ -223,23 +229,23 @@ impl<'a, const D: usize> Update<'a, D> {
     }
 
     /// Δx since the last grid reset, of this process's particles.
-    fn moved(&self, supports: &Supports<D>) -> &[Vector<f64, D>] {
-        self.moved.get_or_init(|| supports.own_values(self.motion()))
+    fn moved(&self, connectivity: &Connectivity<D>) -> &[Vector<f64, D>] {
+        self.moved.get_or_init(|| connectivity.own_values(self.motion()))
     }
 
     /// ∇_r φ of this process's particles.
-    fn gradients(&self, supports: &Supports<D>) -> &[Tensor<f64, D>] {
-        self.gradients.get_or_init(|| supports.own_gradients(self.motion()))
+    fn gradients(&self, connectivity: &Connectivity<D>) -> &[Tensor<f64, D>] {
+        self.gradients.get_or_init(|| connectivity.own_gradients(self.motion()))
     }
 
     /// The particle with the smallest id of those that would leave the grid: its id, and its position outside.
     pub(crate) fn leaving(
         &self,
         particles: &Particles<D>,
-        supports: &Supports<D>,
+        connectivity: &Connectivity<D>,
         grid: &Grid<D>,
     ) -> Option<(usize, Vector<f64, D>)> {
-        let (own, moved) = (supports.own_particles(), self.moved(supports));
+        let (own, moved) = (connectivity.own_particles(), self.moved(connectivity));
         let (position, id) = (&particles.reference().position[own.clone()], &particles.id[own]);
         let first = parallel::map(moved.len().div_ceil(PART), &|part| {
             let own = part * PART..moved.len().min((part + 1) * PART);
@@ -247,7 +253,7 @@ impl<'a, const D: usize> Update<'a, D> {
             ends.filter(|(_, x)| !grid.contains(x)).min_by_key(|(id, _)| *id)
         });
         let first = first.into_iter().flatten().min_by_key(|(id, _)| *id);
-        supports.processes().told(&first).into_iter().flatten().min_by_key(|(id, _)| *id)
+        connectivity.processes().told(&first).into_iter().flatten().min_by_key(|(id, _)| *id)
     }
 
     /// Evaluates the internal variables at the end of the step, which [`Self::commit`] then writes. Returns the id of the first particle of
@@ -257,13 +263,13 @@ impl<'a, const D: usize> Update<'a, D> {
         &mut self,
         particles: &Particles<D>,
         bodies: &[Body<L>],
-        supports: &Supports<D>,
+        connectivity: &Connectivity<D>,
         dt: f64,
     ) -> Option<usize> {
         let variable_count = particles.variable_count;
         let (mut next, undefined) = (particles.memory.clone(), First::none());
         if variable_count > 0 || !particles.dilatation.is_empty() {
-            let (own, gradients) = (supports.own_particles(), self.gradients(supports));
+            let (own, gradients) = (connectivity.own_particles(), self.gradients(connectivity));
             let update = |p: usize, next: &mut [f64]| {
                 let law = &bodies[particles.body[p] as usize].law;
                 let memory = &particles.memory[p * variable_count..(p + 1) * variable_count];
@@ -287,10 +293,10 @@ impl<'a, const D: usize> Update<'a, D> {
                     next.split_off_mut(..variable_count).into_iter().for_each(|next| update(p, next));
                 }
             });
-            supports.share_particles(variable_count, &mut next);
+            connectivity.share_particles(variable_count, &mut next);
         }
         self.memory = Some(next);
-        undefined.anywhere(supports.processes()).map(|(particle, ())| particle)
+        undefined.anywhere(connectivity.processes()).map(|(particle, ())| particle)
     }
 
     /// Writes the new state to the particles, once per step. No other code of a step changes positions, deformations or internal variables.
@@ -298,35 +304,36 @@ impl<'a, const D: usize> Update<'a, D> {
         mut self,
         particles: &mut Particles<D>,
         bodies: &[Body<L>],
-        supports: &Supports<D>,
+        connectivity: &Connectivity<D>,
         dt: f64,
     ) -> Committed {
-        particles.dilatation = dilatation::after(particles, bodies, supports, self.state());
+        particles.dilatation = dilatation::after(particles, bodies, connectivity, self.state());
         if self.memory.is_none() {
-            self.remember(particles, bodies, supports, dt);
+            self.remember(particles, bodies, connectivity, dt);
         }
         let next = self.memory.take().unwrap_or_default();
         let yielding = yielding(particles, bodies, &next);
         particles.memory = next;
-        let strain = self.move_particles(particles, supports);
+        let strain = self.move_particles(particles, connectivity);
         // Without inertia there are no increments.
         let increments =
             [(&mut particles.velocity, self.delta_velocity), (&mut particles.acceleration, self.delta_acceleration)];
         let with_changes = increments.into_iter().zip(self.smoothed.unwrap_or_default());
         for ((field, delta), changed) in with_changes.filter(|((_, delta), _)| !delta.is_empty()) {
-            let (own, mut delta) = (supports.own_particles(), supports.own_values(&delta));
+            let (own, mut delta) = (connectivity.own_particles(), connectivity.own_values(&delta));
             if !changed.is_empty() {
                 parallel::zip(&mut delta, &changed[own.clone()], |delta, changed| *delta += changed);
             }
             parallel::zip(&mut field[own], &delta, |field, delta| *field += delta);
-            supports.share_particles(D, bytemuck::cast_slice_mut(field));
+            connectivity.share_particles(D, bytemuck::cast_slice_mut(field));
         }
         Committed { strain, yielding }
     }
 
     /// Writes x = x_r + Δx and F = (I + ∇_r φ) F_r. Returns the largest strain since the last grid reset.
-    fn move_particles(&self, particles: &mut Particles<D>, supports: &Supports<D>) -> f64 {
-        let (own, moved, gradients) = (supports.own_particles(), self.moved(supports), self.gradients(supports));
+    fn move_particles(&self, particles: &mut Particles<D>, connectivity: &Connectivity<D>) -> f64 {
+        let (own, moved, gradients) =
+            (connectivity.own_particles(), self.moved(connectivity), self.gradients(connectivity));
         let Particles { position, displacement_gradient, reference, .. } = particles;
         let (first, reference) = (own.start, reference.as_ref());
         let (x, h) = (&mut position[own.clone()], &mut displacement_gradient[own]);
@@ -346,9 +353,9 @@ impl<'a, const D: usize> Update<'a, D> {
             }
             largest
         });
-        supports.share_particles(D, bytemuck::cast_slice_mut(position));
-        supports.share_particles(D * D, bytemuck::cast_slice_mut(displacement_gradient));
-        let largest = supports.processes().told(&strains.into_iter().fold(0.0, f64::max));
+        connectivity.share_particles(D, bytemuck::cast_slice_mut(position));
+        connectivity.share_particles(D * D, bytemuck::cast_slice_mut(displacement_gradient));
+        let largest = connectivity.processes().told(&strains.into_iter().fold(0.0, f64::max));
         let largest = largest.into_iter().fold(0.0, f64::max);
         mutant!("transfer: no strain resets the grid": largest = 0.0);
         largest
@@ -386,13 +393,14 @@ mod tests {
         let scene = crate::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
         let simulation = scene.build::<2>("scenes".as_ref())?;
         let (particles, dt) = (&simulation.particles, 0.05);
-        let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
-        let (nodal, newmark) = (Nodal::at_rest(particles, &supports), Newmark::default());
+        let (connectivity, nodes) =
+            Connectivity::new(&simulation.approximation, &simulation.grid, &particles.position)?;
+        let (nodal, newmark) = (Nodal::at_rest(particles, &connectivity), Newmark::default());
         // From rest to the acceleration a within the step: Δφ = β Δt² a, and a third derivative a/Δt.
         let (a, beta) = (Vector::from([3.0, 4.0]), newmark.beta);
         let dphi = vec![a * (beta * dt * dt); nodes.len()];
         let update = Update::new(&newmark.alphas(dt), &nodal, &nodal, &[], WallUpdate::Literal, &dphi);
-        let error = update.local_error(particles, &supports, beta - 1.0 / 6.0, dt);
+        let error = update.local_error(particles, &connectivity, beta - 1.0 / 6.0, dt);
         assert!((error / ((beta - 1.0 / 6.0) * dt * dt * a.norm()) - 1.0).abs() < 1e-12);
         Ok(())
     }

@@ -126,7 +126,7 @@ fn rows_at_wall(scene: &Value, side: usize) -> Result<Rows, Failure> {
     let index = |x: f64| (x / simulation.grid.spacing).round() as u32;
     let nodes: Vec<Node> = coming.positions().map(|x| [index(x[0]), index(x[1]), 0]).collect();
     let equilibrium = coming.equilibrium();
-    let extension = equilibrium.step.supports.extension().ok_or("no node follows")?;
+    let extension = equilibrium.step.connectivity.extension().ok_or("no node follows")?;
     Ok(rows(&nodes, extension, |[x, y, _]| match side {
         0 => [x, y, 0],
         1 => [x, 16 - y, 0],

@@ -5,8 +5,8 @@ use super::*;
 /// The number of windows of each kind (nodes along each axis, particles).
 fn windows<const D: usize>(cells: [u32; D], per_axis: u32) -> Vec<([usize; 3], usize, usize)> {
     let (grid, positions) = regular(cells, per_axis);
-    let (supports, _) = Supports::new(&Approximation::from(Linear), &grid, &positions).unwrap();
-    let mut all = supports.windows();
+    let (connectivity, _) = Connectivity::new(&Approximation::from(Linear), &grid, &positions).unwrap();
+    let mut all = connectivity.windows();
     all.sort_unstable();
     all.chunk_by(|a, b| a == b).map(|same| (same[0].0, same[0].1, same.len())).collect()
 }
@@ -27,20 +27,20 @@ fn a_regular_layout_fills_the_vector_lanes() {
     // Cells apart do not share a window.
     let grid = Grid::<1> { origin: Vector::zeros(), spacing: 1.0, cells: [64] };
     let apart = [0.5, 2.5, 3.5].map(|x| Vector::from([x]));
-    let (supports, _) = Supports::new(&Approximation::from(Linear), &grid, &apart).unwrap();
-    assert_eq!(supports.windows(), [([2, 1, 1], 1), ([3, 1, 1], 2)]);
-    let (plain, _) = Supports::plain(&Approximation::from(Linear), &grid, &apart).unwrap();
+    let (connectivity, _) = Connectivity::new(&Approximation::from(Linear), &grid, &apart).unwrap();
+    assert_eq!(connectivity.windows(), [([2, 1, 1], 1), ([3, 1, 1], 2)]);
+    let (plain, _) = Connectivity::plain(&Approximation::from(Linear), &grid, &apart).unwrap();
     assert!(plain.windows().is_empty());
 }
 
 fn bytes_are_those_of_the_arrays<const D: usize>() -> Result<(), Failure> {
     let (grid, positions) = regular([3; D], 2);
-    let (plain, _) = Supports::plain(&Approximation::from(Linear), &grid, &positions)?;
+    let (plain, _) = Connectivity::plain(&Approximation::from(Linear), &grid, &positions)?;
     let entries: usize = (0..positions.len()).map(|p| plain.of(p).count()).sum();
     // An entry is a node, N and ∇N. Each particle stores its position in memory and the start of its entries.
     assert_eq!(plain.bytes(), entries * (4 + 8 + 8 * D) + 4 * positions.len() + 8 * (positions.len() + 1));
     // Weights of every window, eight lanes wide; the particles of each lane; a slot of each particle; the nodes twice.
-    let (tiled, nodes) = Supports::new(&Approximation::from(Linear), &grid, &positions)?;
+    let (tiled, nodes) = Connectivity::new(&Approximation::from(Linear), &grid, &positions)?;
     let windows = tiled.windows();
     let weights: usize = windows.iter().map(|(width, _)| 2 * 64 * width[..D].iter().sum::<usize>()).sum();
     let least = weights + windows.len() * (8 * 4 + 12) + 4 * positions.len() + 8 * nodes.len();
@@ -51,8 +51,8 @@ fn bytes_are_those_of_the_arrays<const D: usize>() -> Result<(), Failure> {
 fn frozen_bytes_are_those_of_the_tangent<const D: usize>(law: &Material) -> Result<(), Failure> {
     let (grid, positions) = regular([3; D], 2);
     let shape = Approximation::from(Linear);
-    let (tiled, _) = Supports::new(&shape, &grid, &positions)?;
-    let (plain, _) = Supports::plain(&shape, &grid, &positions)?;
+    let (tiled, _) = Connectivity::new(&shape, &grid, &positions)?;
+    let (plain, _) = Connectivity::plain(&shape, &grid, &positions)?;
     let mut particles = Particles::default();
     positions.iter().for_each(|&x| particles.push(x, Vector::zeros(), 1.0, 1.0, 0));
     // A, the upper triangle of B, κ and q; also b and c if the law has them; 𝔸 itself without a closed form.

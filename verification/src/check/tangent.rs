@@ -196,7 +196,7 @@ fn columns<const D: usize, L>(
 ) -> Vec<(usize, usize, Vector<f64, D>)> {
     let held = |node, k| equilibrium.prescribed.iter().any(|dof| dof.node == node && dof.component == k);
     // A node that follows others is no unknown: its block is the identity, and its product vanishes.
-    let extension = equilibrium.step.supports.extension();
+    let extension = equilibrium.step.connectivity.extension();
     let followers: HashSet<usize> = extension.into_iter().flat_map(|all| all.rows().map(|(outer, _)| outer)).collect();
     let unknown = |node: &usize| !followers.contains(node);
     let mut columns = Vec::new();
@@ -246,7 +246,7 @@ fn worse(a: f64, b: f64) -> f64 {
 fn worst_condition<const D: usize, L: Law>(equilibrium: &Equilibrium<'_, D, L>, dphi: &[Vector<f64, D>]) -> f64 {
     let particles = equilibrium.step.particles;
     (0..particles.len()).fold(1.0, |worst: f64, p| {
-        let g = equilibrium.step.supports.gradient_at(p, dphi);
+        let g = equilibrium.step.connectivity.gradient_at(p, dphi);
         worst.max(condition(&(identity::<f64, D>() + compose(&g, &particles.displacement_gradient[p]))))
     })
 }

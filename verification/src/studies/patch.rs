@@ -11,7 +11,7 @@ use bfree::material::{Lame, Law, Material, MaterialState, NeoHookean};
 use bfree::mechanics::loads::Loads;
 use bfree::mechanics::residual::Equilibrium;
 use bfree::mechanics::schemes::{Alphas, Newmark, Scheme, Statics};
-use bfree::mechanics::sweep::Supports;
+use bfree::mechanics::sweep::Connectivity;
 use bfree::mechanics::terms::Step;
 use bfree::mechanics::transfer::{Nodal, Update, WallUpdate};
 use bfree::particles::{Body, Particles};
@@ -109,18 +109,18 @@ fn affine_motion<const D: usize>(name: &str, shape: &Approximation, report: &mut
     for h in &mut particles.displacement_gradient {
         *h = random.tensor() * (0.4 / D as f64);
     }
-    let (supports, nodes) = Supports::new(shape, &grid, &particles.position)?;
+    let (connectivity, nodes) = Connectivity::new(shape, &grid, &particles.position)?;
     let stretch: Tensor<f64, D> = random.tensor() * 0.5;
     let (shift, centre) = (random.vector::<D>() * 0.3, grid.position([CELLS / 2; D]));
     let map = |x: &Vector<f64, D>| stretch * (x - centre) + shift;
     let dphi: Vec<_> = nodes.positions(&grid).map(|(_, x)| map(&x)).collect();
-    let nodal = Nodal::project(&particles, &supports, 1.0)?;
+    let nodal = Nodal::project(&particles, &connectivity, 1.0)?;
     let dt = 0.1;
     let alphas: Alphas = Newmark::default().alphas(dt);
     let update = Update::new(&alphas, &nodal, &nodal, &[], WallUpdate::Consistent, &dphi);
     let mut after = particles.clone();
     let bodies: [Body<Material>; 0] = [];
-    update.commit(&mut after, &bodies, &supports, dt);
+    update.commit(&mut after, &bodies, &connectivity, dt);
     let (mut position, mut strain): (f64, f64) = (0.0, 0.0);
     for p in 0..particles.len() {
         let x = &particles.position[p];
@@ -134,7 +134,7 @@ fn affine_motion<const D: usize>(name: &str, shape: &Approximation, report: &mut
     report.push(&["F = A F_n", name, &dimension], strain, Bound::AtMost(EXACT));
 
     // An affine velocity of the nodes must reach the particles unchanged.
-    let velocity = supports.values(&dphi);
+    let velocity = connectivity.values(&dphi);
     let error = velocity.iter().zip(&particles.position).fold(0.0, |worst, (v, x)| worse(worst, (v - map(x)).amax()));
     report.push(&["v = A x + b", name, &dimension], error, Bound::AtMost(EXACT));
     Ok(())
@@ -228,16 +228,16 @@ fn patch_test<const D: usize>(name: &str, shape: &Approximation, report: &mut Re
         let mut particles = Particles::default();
         layout.particles(first, count).into_iter().for_each(|x| particles.push_without_inertia(x, volume, volume, 0));
         particles.displacement_gradient.fill(h);
-        let (supports, nodes) = Supports::new(shape, &grid, &particles.position)?;
+        let (connectivity, nodes) = Connectivity::new(shape, &grid, &particles.position)?;
         let (at_rest, nodal) = (vec![Vector::zeros(); nodes.len()], Nodal::default());
-        let (particles, bodies, supports, loads) = (&particles, &bodies, &supports, &Loads::default());
+        let (particles, bodies, connectivity, loads) = (&particles, &bodies, &connectivity, &Loads::default());
         let (nodal, alphas, lumping, time, dt) = (&nodal, Statics::default().end(0.0), 1.0, 0.0, 0.0);
-        let step = Step { particles, bodies, loads, supports, nodal, alphas, lumping, time, dt, poses: None };
+        let step = Step { particles, bodies, loads, connectivity, nodal, alphas, lumping, time, dt, poses: None };
         let equilibrium = Equilibrium::new(step, &[]);
         let force = equilibrium.residual::<f64>(&at_rest)?;
         let mut size = vec![0.0; nodes.len()];
         for p in 0..particles.len() {
-            supports.of(p).for_each(|(node, _, grad_n)| size[node] += grad_n.norm() * stress);
+            connectivity.of(p).for_each(|(node, _, grad_n)| size[node] += grad_n.norm() * stress);
         }
         let inner = nodes.positions(&grid).map(|(index, _)| index.iter().all(|i| judged.contains(i)));
         let worst = (force.iter().zip(&size).zip(inner).filter(|(_, inner)| *inner))

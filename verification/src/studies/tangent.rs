@@ -14,7 +14,7 @@ use bfree::mechanics::loads::Rayleigh;
 use bfree::mechanics::loads::{
     Curve, Gravity, Loads, Motion, Prescribed, Pressing, Selection, SurfaceLoad, SurfacePoint,
 };
-use bfree::mechanics::sweep::Supports;
+use bfree::mechanics::sweep::Connectivity;
 use bfree::particles::{Body, Dilatation, Particles};
 use bfree::scalar::Real;
 use bfree::simulation::{Settings, Simulation};
@@ -122,9 +122,10 @@ fn dimension<const D: usize, L: Law + Clone>(
                     continue;
                 }
                 let mut ways = vec![(shape.to_owned(), simulation.next_step()?)];
-                if ways[0].1.supports().is_tiled() {
-                    let (plain, _) = Supports::plain(&approximation, &simulation.grid, &simulation.particles.position)?;
-                    ways.push((format!("{shape}, plain"), simulation.next_step()?.with_supports(plain)));
+                if ways[0].1.connectivity().is_tiled() {
+                    let (plain, _) =
+                        Connectivity::plain(&approximation, &simulation.grid, &simulation.particles.position)?;
+                    ways.push((format!("{shape}, plain"), simulation.next_step()?.with_connectivity(plain)));
                 }
                 for (way, coming) in &ways {
                     let equilibrium = coming.equilibrium();

@@ -7,7 +7,7 @@ use crate::settling::{block, lame};
 use crate::studies::StudyError;
 use bfree::approximation::{Approximation, ShapeFunction};
 use bfree::material::{Law, Material};
-use bfree::mechanics::sweep::Supports;
+use bfree::mechanics::sweep::Connectivity;
 use bfree::mechanics::transfer::Nodal;
 use bfree::simulation::Simulation;
 use bfree::solver::NonlinearProblem;
@@ -56,16 +56,16 @@ fn compare<const D: usize, L: Law>(
 ) -> Result<(), StudyError> {
     let shape = &simulation.approximation;
     let (grid, positions) = (&simulation.grid, &simulation.particles.position);
-    let (fast, nodes) = Supports::new(shape, grid, positions)?;
-    let (plain, _) = Supports::plain(shape, grid, positions)?;
+    let (fast, nodes) = Connectivity::new(shape, grid, positions)?;
+    let (plain, _) = Connectivity::plain(shape, grid, positions)?;
     let prescribed = simulation.prescribed(&nodes);
     let count = nodes.len();
     let dphi: Vec<Vector<f64, D>> = random.field(count).iter().map(|x: &Vector<f64, D>| x * (0.01 * SPACING)).collect();
     let u: Vec<Vector<f64, D>> = random.field(count);
-    let by = |supports: &Supports<D>| -> Result<[Vec<f64>; 5], StudyError> {
-        let nodal = Nodal::project(&simulation.particles, supports, 0.5)?;
+    let by = |connectivity: &Connectivity<D>| -> Result<[Vec<f64>; 5], StudyError> {
+        let nodal = Nodal::project(&simulation.particles, connectivity, 0.5)?;
         let alphas = simulation.settings.scheme.end(simulation.clock.step());
-        let equilibrium = simulation.equilibrium(supports, &nodal, &prescribed, alphas, 0.1);
+        let equilibrium = simulation.equilibrium(connectivity, &nodal, &prescribed, alphas, 0.1);
         let tangent = equilibrium.tangent(None, &dphi)?;
         let mut product = vec![Vector::zeros(); count];
         tangent.product(&u, &mut product);

@@ -3,7 +3,7 @@
 use crate::processor::Thread;
 use crate::studies::StudyError;
 use bfree::mechanics::loads::ForceField;
-use bfree::mechanics::sweep::Supports;
+use bfree::mechanics::sweep::Connectivity;
 use bfree::plan::Plan;
 use bfree::simulation::Simulation;
 use bfree::solver::NewtonHistory;
@@ -118,8 +118,9 @@ pub(super) fn drive<const D: usize>(
 
 /// The work of one product at the start of a run.
 fn product_work<const D: usize>(simulation: &Simulation<D>) -> Result<f64, StudyError> {
-    let (supports, _) = Supports::new(&simulation.approximation, &simulation.grid, &simulation.particles.position)?;
-    Ok((0..supports.particles()).map(|p| PARTICLE + supports.of(p).count() as f64).sum())
+    let (connectivity, _) =
+        Connectivity::new(&simulation.approximation, &simulation.grid, &simulation.particles.position)?;
+    Ok((0..connectivity.particles()).map(|p| PARTICLE + connectivity.of(p).count() as f64).sum())
 }
 
 /// A force field with tabulated values for the next step, so that they cost the step nothing.

@@ -3,7 +3,7 @@
 use super::columns::WIDEST;
 use super::group::Group;
 use super::plain::Plain;
-use super::points::{Points, SupportError};
+use super::points::{ConnectivityError, Points};
 use super::tiled::Tiled;
 use super::{Each, shares};
 use crate::aggregation::Extension;
@@ -24,7 +24,7 @@ use std::sync::{Arc, OnceLock};
 /// ```
 /// use bfree::approximation::Lme;
 /// use bfree::grid::Grid;
-/// use bfree::mechanics::sweep::Supports;
+/// use bfree::mechanics::sweep::Connectivity;
 /// use bfree::shape::{Ball, Filling, fill};
 /// use bfree::tensor::{Vector, identity};
 ///
@@ -32,19 +32,19 @@ use std::sync::{Arc, OnceLock};
 /// let disc = Ball { center: Vector::from([3.0, 3.0]), radius: 2.0 }.into();
 /// let seeds = fill(&grid, &disc, Filling { per_axis: 2, ..Filling::default() })?;
 /// let positions: Vec<_> = seeds.iter().map(|seed| seed.position).collect();
-/// let (supports, nodes) = Supports::new(&Lme::new(3.0, 1e-6), &grid, &positions)?;
-/// assert_eq!(supports.particles(), positions.len());
+/// let (connectivity, nodes) = Connectivity::new(&Lme::new(3.0, 1e-6), &grid, &positions)?;
+/// assert_eq!(connectivity.particles(), positions.len());
 /// // The field x_I is reproduced at the particles: Σ N x_I = x, Σ x_I ⊗ ∇N = I.
 /// let x: Vec<_> = nodes.positions(&grid).map(|(_, x)| x).collect();
-/// let apart = supports.values(&x).iter().zip(&positions).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+/// let apart = connectivity.values(&x).iter().zip(&positions).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
 /// assert!(apart < 1e-13);
-/// assert!((supports.gradient_at(7, &x) - identity()).norm() < 1e-12);
-/// let sum: f64 = supports.of(7).map(|(_, n, _)| n).sum();
+/// assert!((connectivity.gradient_at(7, &x) - identity()).norm() < 1e-12);
+/// let sum: f64 = connectivity.of(7).map(|(_, n, _)| n).sum();
 /// assert!((sum - 1.0).abs() < 1e-14);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug)]
-pub struct Supports<const D: usize> {
+pub struct Connectivity<const D: usize> {
     pub(super) implementation: Implementation<D>,
     pub(super) grid: Grid<D>,
     /// Active nodes.
@@ -83,7 +83,7 @@ macro_rules! dispatch {
 
 pub(super) use dispatch;
 
-impl<const D: usize> Supports<D> {
+impl<const D: usize> Connectivity<D> {
     /// Evaluates the shape functions at all positions and numbers the active nodes.
     ///
     /// # Errors
@@ -92,16 +92,16 @@ impl<const D: usize> Supports<D> {
         approximation: &A,
         grid: &Grid<D>,
         positions: &[Vector<f64, D>],
-    ) -> Result<(Self, Nodes), SupportError> {
+    ) -> Result<(Self, Nodes), ConnectivityError> {
         Self::rebuilt(None, approximation, grid, &Points::at(positions), &Pool::default())
     }
 
-    /// [`Self::new`] in the memory of `reused`, such as the supports of the last step. Sorting begins with the order of particles
+    /// [`Self::new`] in the memory of `reused`, such as the connectivity of the last step. Sorting begins with the order of particles
     /// in `reused`. The result does not depend on `reused`. If the points have ids, the result does not depend on the order of particles
     /// in memory either, because sums run over cells and ids.
     ///
     /// ```
-    /// use bfree::mechanics::{check::direction, sweep::{Points, Supports}};
+    /// use bfree::mechanics::{check::direction, sweep::{Points, Connectivity}};
     /// use bfree::pooled::Pool;
     /// use bfree::tensor::Vector;
     ///
@@ -110,9 +110,9 @@ impl<const D: usize> Supports<D> {
     /// let (shape, grid) = (&simulation.approximation, &simulation.grid);
     /// let before = &simulation.particles.position;
     /// let now: Vec<_> = before.iter().map(|x| x + Vector::from([0.3, 0.1])).collect();
-    /// let (last, _) = Supports::new(shape, grid, before)?;
-    /// let (rebuilt, nodes) = Supports::rebuilt(Some(last), shape, grid, &Points::at(&now), &Pool::default())?;
-    /// let (anew, same_nodes) = Supports::new(shape, grid, &now)?;
+    /// let (last, _) = Connectivity::new(shape, grid, before)?;
+    /// let (rebuilt, nodes) = Connectivity::rebuilt(Some(last), shape, grid, &Points::at(&now), &Pool::default())?;
+    /// let (anew, same_nodes) = Connectivity::new(shape, grid, &now)?;
     /// assert_eq!(nodes, same_nodes);
     /// let field = direction::<2>(nodes.len(), 1);
     /// assert_eq!(rebuilt.values(&field), anew.values(&field));
@@ -127,7 +127,7 @@ impl<const D: usize> Supports<D> {
         grid: &Grid<D>,
         points: &Points<'_, D>,
         pool: &Pool,
-    ) -> Result<(Self, Nodes), SupportError> {
+    ) -> Result<(Self, Nodes), ConnectivityError> {
         let (implementation, nodes) = match approximation.separable() {
             Some(product) if product.width() <= WIDEST => {
                 let reused = reused.and_then(|reused| match reused.implementation {
@@ -150,7 +150,7 @@ impl<const D: usize> Supports<D> {
     /// ```
     /// use bfree::approximation::Lme;
     /// use bfree::grid::Grid;
-    /// use bfree::mechanics::{check::direction, sweep::Supports};
+    /// use bfree::mechanics::{check::direction, sweep::Connectivity};
     /// use bfree::shape::{Ball, Filling, fill};
     /// use bfree::tensor::Vector;
     ///
@@ -158,8 +158,8 @@ impl<const D: usize> Supports<D> {
     /// let disc = Ball { center: Vector::from([3.0, 3.0]), radius: 2.0 }.into();
     /// let seeds = fill(&grid, &disc, Filling { per_axis: 2, ..Filling::default() })?;
     /// let (lme, positions) = (Lme::new(3.0, 1e-6), seeds.iter().map(|seed| seed.position).collect::<Vec<_>>());
-    /// let (fast, nodes) = Supports::new(&lme, &grid, &positions)?;
-    /// let (plain, same_nodes) = Supports::plain(&lme, &grid, &positions)?;
+    /// let (fast, nodes) = Connectivity::new(&lme, &grid, &positions)?;
+    /// let (plain, same_nodes) = Connectivity::plain(&lme, &grid, &positions)?;
     /// assert_eq!(nodes, same_nodes);
     /// let field = direction::<2>(nodes.len(), 1);
     /// let (of_fast, of_plain) = (fast.values(&field), plain.values(&field));
@@ -178,7 +178,7 @@ impl<const D: usize> Supports<D> {
         approximation: &A,
         grid: &Grid<D>,
         positions: &[Vector<f64, D>],
-    ) -> Result<(Self, Nodes), SupportError> {
+    ) -> Result<(Self, Nodes), ConnectivityError> {
         let points = Points::at(positions);
         let (plain, nodes) = Plain::new(approximation, grid, &points)?;
         Ok((Self::of_implementation(Implementation::Plain(plain), grid, &nodes, &points, &Pool::default()), nodes))
@@ -205,7 +205,7 @@ impl<const D: usize> Supports<D> {
         }
     }
 
-    /// These supports with an extension u = E û: outer nodes follow inner ones, and equilibria are solved for the inner nodes alone.
+    /// This connectivity with an extension u = E û: outer nodes follow inner ones, and equilibria are solved for the inner nodes alone.
     pub(crate) fn with_extension(self, extension: Extension) -> Self {
         Self { extension: Some(Arc::new(extension)), ..self }
     }
@@ -234,7 +234,7 @@ impl<const D: usize> Supports<D> {
     /// The order in which passes take the particles: by block, cell and id. `None` if the particles lie in memory in this order.
     ///
     /// ```
-    /// use bfree::mechanics::sweep::Supports;
+    /// use bfree::mechanics::sweep::Connectivity;
     ///
     /// // A disc with its last particle first: passes go backwards through memory, cell by cell.
     /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
@@ -242,10 +242,10 @@ impl<const D: usize> Supports<D> {
     /// let particles = &mut simulation.particles;
     /// let backwards: Vec<u32> = (0..particles.len() as u32).rev().collect();
     /// particles.rearrange(&backwards);
-    /// let (supports, _) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
-    /// particles.rearrange(&supports.block_order().ok_or("backwards")?);
-    /// let (supports, _) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
-    /// assert_eq!(supports.block_order(), None);
+    /// let (connectivity, _) = Connectivity::new(&simulation.approximation, &simulation.grid, &particles.position)?;
+    /// particles.rearrange(&connectivity.block_order().ok_or("backwards")?);
+    /// let (connectivity, _) = Connectivity::new(&simulation.approximation, &simulation.grid, &particles.position)?;
+    /// assert_eq!(connectivity.block_order(), None);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn block_order(&self) -> Option<Vec<u32>> {
@@ -260,7 +260,7 @@ impl<const D: usize> Supports<D> {
         }
     }
 
-    /// These supports with the number of passes set to zero.
+    /// This connectivity with the number of passes set to zero.
     pub(crate) fn with_no_pass(self) -> Self {
         self.passes.store(0, Ordering::Relaxed);
         self
@@ -291,15 +291,15 @@ impl<const D: usize> Supports<D> {
     /// Number of passes over all particles so far.
     ///
     /// ```
-    /// use bfree::mechanics::{check::direction, sweep::Supports};
+    /// use bfree::mechanics::{check::direction, sweep::Connectivity};
     ///
     /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
     /// let simulation = scene.build::<2>("scenes".as_ref())?;
-    /// let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &simulation.particles.position)?;
-    /// assert_eq!(supports.nodes(), nodes.len());
-    /// let before = supports.passes();
-    /// supports.values(&direction::<2>(nodes.len(), 1));
-    /// assert_eq!(supports.passes(), before + 1);
+    /// let (connectivity, nodes) = Connectivity::new(&simulation.approximation, &simulation.grid, &simulation.particles.position)?;
+    /// assert_eq!(connectivity.nodes(), nodes.len());
+    /// let before = connectivity.passes();
+    /// connectivity.values(&direction::<2>(nodes.len(), 1));
+    /// assert_eq!(connectivity.passes(), before + 1);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn passes(&self) -> u64 {
