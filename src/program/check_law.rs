@@ -8,7 +8,7 @@ use tangent_check::library::child::Host;
 /// `bfree check-law`.
 #[derive(Args)]
 #[command(disable_help_flag = true)]
-pub struct CheckLaw {
+pub(super) struct CheckLaw {
     /// The files and options of `tangent-check`; --help lists them.
     #[arg(trailing_var_arg = true, allow_hyphen_values = true, value_name = "FILE…|OPTIONS")]
     arguments: Vec<OsString>,

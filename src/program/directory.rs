@@ -26,7 +26,7 @@ pub(crate) fn of_results(out: Option<&Path>, scene: &Path) -> Result<PathBuf, Fa
 
 /// Locks the directory against other runs until the returned handle is dropped, and creates it first if `may_create`. A file system
 /// without locks locks nothing.
-pub fn lock(directory: &Path, may_create: bool) -> Result<Option<File>, Failure> {
+pub(super) fn lock(directory: &Path, may_create: bool) -> Result<Option<File>, Failure> {
     if may_create {
         let is_file = directory.exists() && !directory.is_dir();
         let created = if is_file { Err(ErrorKind::NotADirectory.into()) } else { create_dir_all(directory) };
@@ -40,7 +40,7 @@ pub fn lock(directory: &Path, may_create: bool) -> Result<Option<File>, Failure>
 }
 
 /// Prepares the directory for a new run. Results of an earlier run are lost only with `discard`.
-pub fn clear(directory: &Path, discard: bool) -> Result<(), Failure> {
+pub(super) fn clear(directory: &Path, discard: bool) -> Result<(), Failure> {
     if let Some(path) = foreign(directory) {
         let what = format!("{}, which no run wrote and a run would replace: move it, or ", path.display());
         return Err(would_be_lost(directory, &what));

@@ -5,7 +5,7 @@ use std::fmt::Display;
 use std::io::{ErrorKind, Write as _};
 
 /// Reason why a command fails. Exit codes: 2 for a scene or an option that cannot be used, 1 for a failed run, 130 after Ctrl-C.
-pub enum Failure {
+pub(super) enum Failure {
     Scene(Box<dyn Error>),
     Run(Box<dyn Error>),
     Interrupted,
@@ -50,7 +50,7 @@ struct Refused {
 }
 
 /// Writes to standard output. A pipe that its reader has closed, as `head` does, is not an error.
-pub fn print(text: impl Display) -> Result<(), Failure> {
+pub(super) fn print(text: impl Display) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
     match writeln!(out, "{text}").and_then(|()| out.flush()) {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(Failure::system("write to standard output")(error)),
@@ -59,6 +59,6 @@ pub fn print(text: impl Display) -> Result<(), Failure> {
 }
 
 /// Writes a line to standard error. A failure to write is ignored, because it cannot be reported anywhere.
-pub fn tell(text: impl Display) {
+pub(super) fn tell(text: impl Display) {
     let _ = writeln!(std::io::stderr().lock(), "{text}");
 }

@@ -36,7 +36,7 @@ const KEY_WIDTH: usize = 34;
 
 /// `bfree new`.
 #[derive(Args)]
-pub struct New {
+pub(super) struct New {
     /// The problem; without a problem, all problems are listed.
     #[arg(value_parser = PossibleValuesParser::new(PROBLEMS.map(|(name, _)| name)))]
     problem: Option<String>,

@@ -23,7 +23,7 @@ const ROUND_OFF: f64 = 16.0;
 
 /// `bfree newton`.
 #[derive(Args)]
-pub struct Newton {
+pub(super) struct Newton {
     #[command(flatten)]
     scene: SceneArguments,
     /// The steps to show, counted from 1: 12, or 10..20. The steps before them are computed, too.

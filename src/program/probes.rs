@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use std::fmt::{Display, Formatter};
 
 /// A probe of the scene, and the particle nearest to its point at the start.
-pub struct Bound<const D: usize> {
+pub(super) struct Bound<const D: usize> {
     pub probe: Probe<D>,
     particle: usize,
     /// Distance of the particle from the point given in the scene.

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 
 /// `bfree reproduce`.
 #[derive(Args)]
-pub struct Reproduce {
+pub(super) struct Reproduce {
     /// The directory of the results of a run, or a file in it.
     results: PathBuf,
     /// Directory of the new results.

@@ -32,7 +32,7 @@ use std::time::Instant;
 
 /// `bfree run`.
 #[derive(Args, Default)]
-pub struct Run {
+pub(super) struct Run {
     #[command(flatten)]
     scene: SceneArguments,
     /// Directory of the results [default: out/ and the scene's name].

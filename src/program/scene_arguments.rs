@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 
 /// The scene file, and overrides of its keys.
 #[derive(Args, Default)]
-pub struct SceneArguments {
+pub(super) struct SceneArguments {
     /// The scene, a JSON file.
     pub scene: PathBuf,
     /// Override one key of the scene, for example time.step=0.01 or approximation='"linear"'.

@@ -55,7 +55,7 @@ impl Schedule {
 }
 
 /// The files of a run.
-pub struct Records<const D: usize> {
+pub(super) struct Records<const D: usize> {
     pub recorder: Recorder<D>,
     /// `None` without checkpoints, and after the last one.
     pub checkpoints: Option<Checkpoints>,
@@ -79,7 +79,7 @@ impl<const D: usize> Records<D> {
 }
 
 /// A simulation in progress, with its records.
-pub struct Steps<const D: usize> {
+pub(super) struct Steps<const D: usize> {
     pub simulation: Simulation<D>,
     /// `None` in all processes but the first.
     pub records: Option<Records<D>>,
