@@ -70,9 +70,31 @@ impl Lists<u32> {
         Self::of_places(&self.entries, count).map(|place| owners[place as usize])
     }
 
+    /// The rows that have an entry.
+    pub(crate) fn without_empty_rows(mut self) -> Self {
+        self.starts.dedup();
+        self.starts.shrink_to_fit();
+        self
+    }
+
     /// `f` of every entry.
     pub(crate) fn map(mut self, f: impl Fn(u32) -> u32) -> Self {
         self.entries.iter_mut().for_each(|entry| *entry = f(*entry));
         self
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_transpose_has_ascending_rows() {
+        let mut lists = Lists::default();
+        [vec![2, 0], vec![], vec![2]].into_iter().for_each(|row| lists.push(row));
+        assert_eq!((lists.len(), lists.row(0), lists.owners()), (3, &[2, 0][..], vec![0, 0, 2]));
+        let transposed = lists.transposed(3);
+        assert_eq!(transposed.arrays(), [&[0, 1, 1, 3][..], &[0, 0, 2]]);
+        assert_eq!(transposed.without_empty_rows().arrays(), [&[0, 1, 3][..], &[0, 0, 2]]);
     }
 }

@@ -60,14 +60,9 @@ impl Rows {
         let [_, entries] = self.entries.arrays();
         let count = entries.iter().max().map_or(0, |&last| last as usize + 1);
         let (places, owners) = (Lists::of_places(entries, count), self.entries.owners());
-        let mut transposed = Self::default();
-        for node in (0..count).filter(|&node| !places.row(node).is_empty()) {
-            let row = places.row(node).iter().map(|&place| place as usize);
-            transposed.nodes.push(node as u32);
-            transposed.entries.push(row.clone().map(|place| owners[place]));
-            transposed.weights.extend(row.map(|place| self.weights[place]));
-        }
-        transposed
+        let nodes = (0..count).filter(|&node| !places.row(node).is_empty()).map(|node| node as u32).collect();
+        let weights = places.arrays()[1].iter().map(|&place| self.weights[place as usize]).collect();
+        Self { nodes, entries: places.without_empty_rows().map(|place| owners[place as usize]), weights }
     }
 
     fn bytes(&self) -> usize {
@@ -105,12 +100,11 @@ impl Extension {
             (!nearest.is_empty()).then(|| bodies.row(node, &nearest))
         });
         let mut all = Rows::default();
-        for (node, row) in outer.into_iter().zip(rows).filter_map(|(node, row)| Some((node, row?))) {
-            let row = row.into_iter().filter(|(_, weight)| *weight != 0.0);
-            let (leaders, weights): (Vec<u32>, Vec<f64>) = row.unzip();
+        for (node, mut row) in outer.into_iter().zip(rows).filter_map(|(node, row)| Some((node, row?))) {
+            row.retain(|_, weight| *weight != 0.0);
             all.nodes.push(node);
-            all.entries.push(leaders);
-            all.weights.extend(weights);
+            all.entries.push(row.keys().copied());
+            all.weights.extend(row.values());
         }
         Self { degree: pieces.degree, inner: all.transposed(), outer: all }
     }
