@@ -16,8 +16,9 @@ use std::collections::BTreeMap;
 use std::io::{Error, Result, Seek, Write};
 use std::path::{Path, PathBuf};
 
-/// The least number of rows in the chunks of all blocks. A chunk of numbers then fits into the cache of the HDF5 library, which has 1 MiB.
-const CHUNK: usize = 1 << 15;
+/// The least number of rows in the chunks of all blocks. Larger chunks compress better. Smaller ones are read faster, because a reader that
+/// asks for one time inflates whole chunks.
+const CHUNK: usize = 1 << 13;
 
 /// Writes `particles.vtkhdf` of the snapshots in the directory of a run, and a file of every other series beside it. `bodies` are the names
 /// of the bodies, which become those of the blocks. Returns the files written, and for each the snapshots in it and those that are missing.
