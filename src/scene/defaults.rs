@@ -60,7 +60,7 @@ impl Scene {
         let long_steps = self.time.adaptive.is_none() && (!has_inertia || courant() > LONG_STEPS);
         let consistent = has_inertia && self.lumping() == 0.0;
         let needed = long_steps || consistent || computed || self.has_contact();
-        self.aggregation.unwrap_or(needed)
+        self.aggregation.or(self.ghost_stiffness.map(|factor| factor > 0.0)).unwrap_or(needed)
     }
 
     /// ε, the lumped share of the mass. Bodies that touch obstacles or each other lose energy with a lumped mass, and a consistent one
@@ -80,7 +80,7 @@ impl Scene {
     pub(super) fn grid_reset(&self) -> GridReset {
         let flip = self.transfer.is_none_or(|transfer| transfer == transfer::Transfer::Flip);
         let keeps_energy = self.time.scheme() == Parameters::EnergyMomentum;
-        self.grid.reset.unwrap_or(match self.time.scheme().has_inertia() {
+        self.grid.given_reset().unwrap_or(match self.time.scheme().has_inertia() {
             false => GridReset::Strain(STATIC_STRAIN),
             true if flip && self.has_contact() => GridReset::Strain(CONTACT_STRAIN),
             true if flip && (self.is_clamped() || keeps_energy) => GridReset::Strain(VIBRATION_STRAIN),

@@ -36,6 +36,8 @@ pub struct GridBox {
     /// `{"strain": 0.3}` with `obstacles` or `contact`, and `{"strain": 0.1}` for a single body that a fixed face of the box holds from the
     /// start. Otherwise `"every_step"`.
     pub reset: Option<GridReset>,
+    /// Deprecated, and read for one release: the key is now `reset`. If `reset` is given, this key has no effect.
+    pub renewed: Option<GridReset>,
 }
 
 impl GridBox {
@@ -47,6 +49,11 @@ impl GridBox {
     /// The lower corner, zeros if not given.
     pub(super) fn origin(&self) -> Vec<f64> {
         self.origin.clone().unwrap_or_else(|| vec![0.0; self.size.len()])
+    }
+
+    /// When the grid is reset, if that is given.
+    pub(super) fn given_reset(&self) -> Option<GridReset> {
+        self.reset.or(self.renewed)
     }
 
     /// The grid; `None` unless the section is valid and of dimension `D`.
@@ -86,8 +93,10 @@ impl GridBox {
     }
 
     pub(super) fn check(&self, problems: &mut Problems) {
-        if let Some(GridReset::Strain(most)) = self.reset {
-            problems.positive("grid.reset.strain", most);
+        for (key, given) in [("reset", self.reset), ("renewed", self.renewed)] {
+            if let Some(GridReset::Strain(most)) = given {
+                problems.positive(&format!("grid.{key}.strain"), most);
+            }
         }
         if !(1..=3).contains(&self.size.len()) {
             let found = format!("a vector of length {}", self.size.len());

@@ -106,6 +106,10 @@ pub struct Scene {
     /// Default: true without inertia, with a consistent mass (`time.lumping` 0), where the surface of a shape is loaded, with `obstacles` or
     /// `contact`, and in steps of constant length at Courant numbers above 10; else false.
     pub aggregation: Option<bool>,
+    /// Deprecated, and read for one release: aggregation has replaced the ghost stiffness. If `aggregation` is not given, 0 means false,
+    /// and a positive value means true.
+    #[schemars(range(min = 0, max = 1))]
+    pub ghost_stiffness: Option<f64>,
     /// The acceleration of gravity. Default: none.
     pub gravity: Option<load::Gravity>,
     /// Rayleigh damping, a M + b K. Default: none.
@@ -213,6 +217,7 @@ impl Scene {
         for (i, prescribed) in problems.few("prescribed", &self.prescribed).iter().enumerate() {
             prescribed.check(&mut problems, &format!("prescribed[{i}]"), dimension);
         }
+        problems.between("ghost_stiffness", self.ghost_stiffness, 0.0, 1.0);
         self.check_loads(&mut problems, dimension);
         if let Some(initial) = &self.initial_velocity {
             self.check_initial_velocity(initial, &mut problems, dimension);
@@ -289,7 +294,7 @@ impl Scene {
             problems.refuse(&format!("obstacles[{i}]"), "an obstacle", allowed);
         }
         problems.require(self.contact.is_none(), "contact", "contact between bodies", allowed);
-        let kept = self.grid.reset != Some(GridReset::EveryStep);
+        let kept = self.grid.given_reset() != Some(GridReset::EveryStep);
         problems.require(kept, "grid.reset", "\"every_step\"", allowed);
     }
 

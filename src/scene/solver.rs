@@ -45,16 +45,28 @@ pub struct Krylov {
     pub preconditioner: Preconditioning,
     /// The tolerance of each linear solve. Default: `"eisenstat_walker"` in load steps, `{"fixed": 1e-8}` with inertia.
     pub forcing: Option<Forcing>,
+    /// Deprecated, and read for one release: it has no effect. All numbers are in double precision.
+    pub precision: Option<Precision>,
     /// Maximum number of iterations of one linear solve, 1 to 1000000. Default 2000.
     #[schemars(range(min = 1, max = 1_000_000))]
     pub max_iterations: u32,
+}
+
+/// The values of the deprecated key `precision`. Neither has an effect.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Precision {
+    /// Double precision.
+    Double,
+    /// Linear systems in single precision, in earlier releases.
+    Mixed,
 }
 
 impl Default for Krylov {
     fn default() -> Self {
         let NewtonSettings { krylov, max_krylov_iterations, .. } = NewtonSettings::default();
         let (preconditioner, max_iterations) = (Preconditioning::default(), max_krylov_iterations as u32);
-        Self { method: krylov, preconditioner, forcing: None, max_iterations }
+        Self { method: krylov, preconditioner, forcing: None, precision: None, max_iterations }
     }
 }
 

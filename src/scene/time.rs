@@ -25,6 +25,8 @@ pub struct Time {
     /// The time integration scheme: dynamics or statics. Without inertia there are load steps: each ends in static equilibrium under the
     /// loads at its end. Keys of velocities or the mass matrix are then refused. Default: `"newmark"`.
     pub scheme: Option<schemes::Parameters>,
+    /// Deprecated, and read for one release: the key is now `scheme`. If `scheme` is given, this key has no effect.
+    pub inertia: Option<schemes::Parameters>,
     /// Newmark's β (no unit), > 0, with 2β ≥ γ; for `"newmark"` only. Default 0.25, the trapezoidal rule.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub beta: Option<f64>,
@@ -65,7 +67,7 @@ pub struct Adaptive {
 impl Time {
     /// The time integration scheme.
     pub(super) fn scheme(&self) -> schemes::Parameters {
-        self.scheme.unwrap_or_default()
+        self.scheme.or(self.inertia).unwrap_or_default()
     }
 
     /// Newmark's β and γ.

@@ -2,6 +2,7 @@
 
 use super::obstacle::too_stiff;
 use super::shape::Shape as Drawn;
+use super::time::word;
 use super::{BodyUse, Scene};
 use crate::grid::{Grid, indices};
 use crate::material::{Law, Material, poissons_ratio};
@@ -72,6 +73,7 @@ impl Scene {
         let numbers = 0..self.bodies.len();
         let pairs = numbers.clone().flat_map(|b| (0..b).map(move |a| (a, b)));
         let mut all: Vec<String> = pairs.filter_map(|(a, b)| bodies.overlap(a, b)).collect();
+        all.extend(self.deprecated_keys());
         all.extend(bodies.coincident());
         all.extend(numbers.clone().filter_map(|body| bodies.thin(body)));
         all.extend(numbers.filter_map(|body| bodies.locks(body)));
@@ -100,6 +102,27 @@ impl Scene {
             staircase(i, load).filter(|_| pixels)
         }));
         all
+    }
+
+    /// Notes on given keys that the next release refuses.
+    fn deprecated_keys(&self) -> impl Iterator<Item = String> {
+        let ghost_stiffness = self.ghost_stiffness.map(|factor| {
+            let is = self.aggregates();
+            format!(
+                "ghost_stiffness = {factor} is no longer used: aggregation has replaced it, and is {is} here. Remove"
+            )
+        });
+        let precision = self.solver.krylov.precision.map(|_| {
+            "solver.krylov.precision is no longer used: all linear systems are solved in double precision. Remove"
+                .into()
+        });
+        let inertia = self.time.inertia.map(|_| {
+            let scheme = word(self.time.scheme());
+            format!("time.inertia is now called time.scheme, which is {scheme} here. Rename")
+        });
+        let renewed = self.grid.renewed.map(|_| "grid.renewed is now called grid.reset. Rename".into());
+        let notes = [ghost_stiffness, precision, inertia, renewed].into_iter().flatten();
+        notes.map(|note| format!("{note} the key; the next release refuses it"))
     }
 }
 

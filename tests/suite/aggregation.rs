@@ -180,8 +180,14 @@ fn nodes_follow_where_mass_does_not_hold_them() -> Result<(), Failure> {
     let asked = |name: &str, overrides: &[&str]| -> Result<bool, Failure> {
         Ok(scene::<2>(name, overrides)?.settings.aggregation)
     };
-    for (overrides, follow) in [(&[][..], true), (&["approximation=\"linear\""], true), (&["aggregation=false"], false)]
-    {
+    for (overrides, follow) in [
+        (&[][..], true),
+        (&["approximation=\"linear\""], true),
+        (&["aggregation=false"], false),
+        (&["ghost_stiffness=0"], false),
+        (&["ghost_stiffness=0.02"], true),
+        (&["ghost_stiffness=0.02", "aggregation=false"], false),
+    ] {
         assert_eq!(asked("column_static.json", overrides)?, follow, "{overrides:?}");
     }
     assert!(asked("cantilever.json", &[])?);

@@ -1,6 +1,7 @@
 //! The warnings of `bfree check` and of the start of a run, with numbers.
 
-use crate::support::{Failure, merged, shipped, solid};
+use crate::support::{self, Failure, merged, shipped, solid};
+use bfree::mechanics::reference::GridReset;
 use bfree::scene;
 use serde_json::{Value, json};
 use std::path::Path;
@@ -135,6 +136,36 @@ fn a_body_that_locks_is_named_with_its_number_and_its_cure() -> Result<(), Failu
     // A law without a volumetric part needs another remedy.
     let other = json!({"st_venant_kirchhoff": {"young": 100, "poisson": 0.49}});
     assert_one(&of(other, json!({}))?, &["0.490000", "take \"neo_hookean\" with that"]);
+    Ok(())
+}
+
+#[test]
+fn deprecated_keys_are_read_and_named() -> Result<(), Failure> {
+    let body = || json!([block("a", [1.0, 1.0], [4.0, 4.0])]);
+    let grid = json!({"size": [8, 8], "spacing": 1, "renewed": "never"});
+    for (key, given, cure) in [
+        ("ghost_stiffness", json!({"ghost_stiffness": 0.001}), "aggregation"),
+        ("solver.krylov.precision", json!({"solver": {"krylov": {"precision": "double"}}}), "Remove the key"),
+        ("solver.krylov.precision", json!({"solver": {"krylov": {"precision": "mixed"}}}), "Remove the key"),
+        ("time.inertia", json!({"time": {"step": 0.1, "end": 1, "inertia": "newmark"}}), "time.scheme"),
+        ("grid.renewed", json!({"grid": grid}), "grid.reset"),
+    ] {
+        let found = warnings(body(), given, Path::new("."))?;
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert_one(&found, &[key, cure]);
+    }
+    assert_eq!(warnings(body(), json!({}), Path::new("."))?, Vec::<String>::new());
+    assert_eq!(
+        support::scene::<2>("rebound.json", &[r#"grid.renewed="never""#])?.settings.grid_reset,
+        GridReset::Never
+    );
+    // `time.inertia` selects the scheme, unless `time.scheme` is given.
+    for (inertia, has_inertia) in
+        [(r#""none""#, false), (r#""newmark","scheme":"none""#, false), (r#""newmark""#, true)]
+    {
+        let time = format!(r#"time={{"step":0.25,"end":1,"inertia":{inertia}}}"#);
+        assert_eq!(support::scene::<2>("cook.json", &[&time])?.settings.scheme.has_inertia(), has_inertia, "{time}");
+    }
     Ok(())
 }
 

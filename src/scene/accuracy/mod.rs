@@ -135,9 +135,11 @@ pub(super) fn set_keys(scene: &mut Value) -> Result<Vec<Chosen>, Problems> {
     Ok(setter.chosen)
 }
 
-/// Whether the scene asks for load steps.
+/// Whether the scene asks for load steps, by the key `time.scheme` or by its old name.
 fn has_load_steps(scene: &Value) -> bool {
-    scene["time"]["scheme"] == "none"
+    let time = &scene["time"];
+    let scheme = if time["scheme"].is_null() { &time["inertia"] } else { &time["scheme"] };
+    scheme == "none"
 }
 
 /// A part of a scene; `None` if it does not have the type `T`.

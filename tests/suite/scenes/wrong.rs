@@ -6,6 +6,7 @@ use bfree::scene::{self, Place, SceneError};
 
 /// One case a row: text of the good scene => its replacement | the key to be named | words of the message.
 const WRONG_VALUES: &str = r##"
+"aggregation": true => "ghost_stiffness": -1 | ghost_stiffness | -1 is not | 0 | 1
 "along": [0, 2] => "along": [0, 0] | gravity.profile.along | zero vector | direction
 "along": [0, 2] => "along": [1] | gravity.profile.along | length 1 | 2 components
 [4, 0.5] => [0, 0.5] | gravity.profile.factor[1][0] | 0 is not | row before, 0
