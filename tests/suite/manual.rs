@@ -278,11 +278,8 @@ impl Writer {
             }
         } else if let Some(keys) = schema["properties"].as_object() {
             self.text.push_str("\n| key | value | |\n|---|---|---|\n");
-            for (key, value) in keys {
-                let required = schema["required"].as_array().is_some_and(|keys| keys.contains(&key.as_str().into()));
-                let must = if required { "**Required.** " } else { "" };
-                let kind = self.kind(value);
-                self.row(&format!("`{key}`"), &kind, &format!("{must}{}", about(value)));
+            for key in keys.keys() {
+                self.key(key, schema, key);
             }
         } else {
             let kind = self.kind(schema);
@@ -299,13 +296,21 @@ impl Writer {
                 let parts = value["properties"].as_object();
                 let kind = if parts.is_some() { String::new() } else { format!("… is {}", self.kind(value)) };
                 self.row(&format!("`{{\"{key}\": …}}`"), &kind, &about(variant));
-                for (part, value) in parts.into_iter().flatten() {
-                    let kind = self.kind(value);
-                    self.row(&format!("`{key}.{part}`"), &kind, &about(value));
+                for part in parts.into_iter().flat_map(|parts| parts.keys()) {
+                    self.key(&format!("{key}.{part}"), value, part);
                 }
             }
             (None, None) => {}
         }
+    }
+
+    /// The row of a key of an object, whose path is `name`.
+    fn key(&mut self, name: &str, object: &Value, key: &str) {
+        let required = object["required"].as_array().is_some_and(|keys| keys.contains(&key.into()));
+        let must = if required { "**Required.** " } else { "" };
+        let value = &object["properties"][key];
+        let kind = self.kind(value);
+        self.row(&format!("`{name}`"), &kind, &format!("{must}{}", about(value)));
     }
 
     fn row(&mut self, first: &str, second: &str, third: &str) {
