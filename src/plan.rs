@@ -14,7 +14,7 @@ use crate::mechanics::dilatation::Cells;
 use crate::mechanics::loads::PrescribedDof;
 use crate::mechanics::loads::{Motion, Pressing, SurfaceLoad, SurfacePoint};
 use crate::mechanics::reference::GridReset;
-use crate::mechanics::sweep::{Connectivity, ConnectivityError};
+use crate::mechanics::sweep::{Connectivity, ShapeFunctionError};
 use crate::mechanics::terms::{Reason, planned};
 use crate::particles::Body;
 use crate::simulation::{SharedNodes, Simulation};
@@ -151,7 +151,7 @@ impl Plan {
     /// A particle has no shape functions.
     pub fn of<const D: usize, L: Law, A: ShapeFunction>(
         simulation: &Simulation<D, L, A>,
-    ) -> Result<Self, ConnectivityError> {
+    ) -> Result<Self, ShapeFunctionError> {
         let connectivity = simulation.new_connectivity(None)?;
         let nodes = connectivity.active();
         let prescribed = simulation.prescribed(nodes);

@@ -35,21 +35,21 @@ pub struct Extension {
     /// The polynomial degree of the shape functions.
     degree: u32,
     /// The outer nodes, with the inner nodes that each follows.
-    outer: Rows,
+    outer: SparseRows,
     /// Eᵀ: the inner nodes that outer nodes follow, with the places of their outer nodes, ascending.
-    inner: Rows,
+    inner: SparseRows,
 }
 
-/// Sparse rows.
+/// Rows of a sparse matrix.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Rows {
+pub(crate) struct SparseRows {
     /// The node of each row, ascending.
     pub(crate) nodes: Vec<u32>,
     pub(crate) entries: Lists<u32>,
     pub(crate) weights: Vec<f64>,
 }
 
-impl Rows {
+impl SparseRows {
     fn row(&self, place: usize) -> impl Iterator<Item = (usize, f64)> + use<'_> {
         let (entries, weights) = (self.entries.row(place), &self.weights[self.entries.range(place)]);
         entries.iter().zip(weights).map(|(&entry, &weight)| (entry as usize, weight))
@@ -99,7 +99,7 @@ impl Extension {
             let nearest = bodies.nearest(node, &is_good);
             (!nearest.is_empty()).then(|| bodies.row(node, &nearest))
         });
-        let mut all = Rows::default();
+        let mut all = SparseRows::default();
         for (node, mut row) in outer.into_iter().zip(rows).filter_map(|(node, row)| Some((node, row?))) {
             row.retain(|_, weight| *weight != 0.0);
             all.nodes.push(node);
@@ -111,7 +111,7 @@ impl Extension {
 
     /// The extension of several parts that share no nodes, in ascending order: each with the number of its first node.
     pub(crate) fn joined(degree: u32, parts: impl Iterator<Item = (usize, Self)>) -> Self {
-        let mut all = Rows::default();
+        let mut all = SparseRows::default();
         for (first, Self { outer, .. }) in parts {
             let first = first as u32;
             all.nodes.extend(outer.nodes.iter().map(|node| first + node));
@@ -169,7 +169,7 @@ impl Extension {
     }
 
     /// The rows of E and of Eᵀ.
-    pub(crate) fn both(&self) -> [&Rows; 2] {
+    pub(crate) fn rows_and_transpose(&self) -> [&SparseRows; 2] {
         [&self.outer, &self.inner]
     }
 }

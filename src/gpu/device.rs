@@ -253,12 +253,12 @@ impl Gpu {
     }
 
     /// Memory whose contents are unspecified.
-    pub(crate) fn memory_for<T: Number>(&self, len: usize) -> Buffer<T> {
+    pub(crate) fn memory_for<T: DeviceNumber>(&self, len: usize) -> Buffer<T> {
         let memory = if self.has_failed() { None } else { self.allocate(len.max(1)) };
         Buffer { memory, len }
     }
 
-    fn allocate<T: Number>(&self, len: usize) -> Option<CudaSlice<T>> {
+    fn allocate<T: DeviceNumber>(&self, len: usize) -> Option<CudaSlice<T>> {
         // SAFETY: any bytes are numbers of the plain types that buffers hold, and whoever takes a buffer writes it first.
         let memory = unsafe { self.stream.alloc(len) };
         if memory.as_ref().is_err_and(|error| error.0 == sys::CUresult::CUDA_ERROR_OUT_OF_MEMORY) {
@@ -270,14 +270,14 @@ impl Gpu {
     }
 
     /// A copy of the numbers on the device.
-    pub(crate) fn copy_of<T: Number>(&self, numbers: &[T]) -> Buffer<T> {
+    pub(crate) fn copy_of<T: DeviceNumber>(&self, numbers: &[T]) -> Buffer<T> {
         let mut buffer = self.memory_for(numbers.len());
         self.write_at(numbers, &mut buffer, 0);
         buffer
     }
 
     /// Writes numbers into a buffer, from an index on. They have room there.
-    pub(crate) fn write_at<T: Number>(&self, numbers: &[T], buffer: &mut Buffer<T>, at: usize) {
+    pub(crate) fn write_at<T: DeviceNumber>(&self, numbers: &[T], buffer: &mut Buffer<T>, at: usize) {
         if let Some(memory) = buffer.memory.as_mut().filter(|_| !numbers.is_empty() && !self.has_failed()) {
             let copied = self.stream.memcpy_htod(numbers, &mut memory.slice_mut(at..at + numbers.len()));
             // The numbers may go away before the copy is made.
@@ -286,7 +286,7 @@ impl Gpu {
     }
 
     /// Reads numbers from a buffer, from an index on. They exist there. After a failure the numbers stay unchanged.
-    pub(crate) fn read_at<T: Number>(&self, buffer: &Buffer<T>, at: usize, numbers: &mut [T]) {
+    pub(crate) fn read_at<T: DeviceNumber>(&self, buffer: &Buffer<T>, at: usize, numbers: &mut [T]) {
         let Some(memory) = buffer.memory.as_ref().filter(|_| !numbers.is_empty() && !self.has_failed()) else { return };
         let copied = self.stream.memcpy_dtoh(&memory.slice(at..at + numbers.len()), numbers);
         // The copy may still be under way.
@@ -314,7 +314,7 @@ impl Gpu {
     }
 
     /// Sets all bytes of a buffer to zero.
-    pub(crate) fn clear<T: Number>(&self, buffer: &mut Buffer<T>) {
+    pub(crate) fn clear<T: DeviceNumber>(&self, buffer: &mut Buffer<T>) {
         let len = buffer.len;
         if let Some(memory) = buffer.memory.as_mut().filter(|_| len > 0 && !self.has_failed()) {
             _ = self.keep("clearing memory", self.stream.memset_zeros(&mut memory.slice_mut(..len)));
@@ -322,7 +322,7 @@ impl Gpu {
     }
 
     /// Copies one buffer into another of the same length.
-    pub(crate) fn copy<T: Number>(&self, from: &Buffer<T>, to: &mut Buffer<T>) {
+    pub(crate) fn copy<T: DeviceNumber>(&self, from: &Buffer<T>, to: &mut Buffer<T>) {
         let len = from.len.min(to.len);
         if let (Some(from), Some(to), false) = (&from.memory, &mut to.memory, len == 0 || self.has_failed()) {
             let (from, mut to) = (from.slice(..len), to.slice_mut(..len));
@@ -382,9 +382,9 @@ struct Argument<T>(T);
 unsafe impl<T: Copy> DeviceRepr for Argument<T> {}
 
 /// Plain numbers that a device can hold.
-pub(crate) trait Number: Pod + DeviceRepr + ValidAsZeroBits {}
+pub(crate) trait DeviceNumber: Pod + DeviceRepr + ValidAsZeroBits {}
 
-impl<T: Pod + DeviceRepr + ValidAsZeroBits> Number for T {}
+impl<T: Pod + DeviceRepr + ValidAsZeroBits> DeviceNumber for T {}
 
 /// Numbers in the device's memory.
 #[derive(Debug)]

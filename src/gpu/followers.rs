@@ -2,7 +2,7 @@
 
 use super::device::{Buffer, Gpu, arguments};
 use super::vectors::GpuVector;
-use crate::aggregation::Rows;
+use crate::aggregation::SparseRows;
 
 /// E, by which outer nodes follow inner ones, on a device.
 #[derive(Debug)]
@@ -20,8 +20,8 @@ pub(crate) struct Followers {
 impl Followers {
     /// The outer nodes with their inner ones, the inner nodes with the places of their outer ones, and whether each component of an outer node
     /// follows.
-    pub(crate) fn new(gpu: &Gpu, [outer, inner]: [&Rows; 2], follows: &[bool]) -> Self {
-        let numbers = |of: &Rows| {
+    pub(crate) fn new(gpu: &Gpu, [outer, inner]: [&SparseRows; 2], follows: &[bool]) -> Self {
+        let numbers = |of: &SparseRows| {
             let [starts, entries] = of.entries.arrays();
             [&of.nodes, starts, entries].map(|list| gpu.copy_of(list))
         };

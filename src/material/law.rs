@@ -285,7 +285,7 @@ pub(crate) fn internal_variable_names<'a, L: Law + 'a>(laws: impl Iterator<Item 
     names
 }
 
-/// `P = F S` (eq. 7). The F on the left and the F inside S are given separately, for derivatives.
+/// `P = F S` (eq. 7). No other function forms P. The F on the left and the F inside S are given separately, for derivatives.
 ///
 /// ```
 /// use bfree::material::{Lame, Law, MaterialState, NeoHookean, first_piola};
@@ -307,5 +307,6 @@ pub fn first_piola<L: Law, T: Real, const D: usize>(
     f_left: &Tensor<T, D>,
     at: &MaterialState<T, D>,
 ) -> Tensor<T, D> {
+    mutant!("laws: P = S F for F S": { return law.stress(at) * f_left; });
     f_left * law.stress(at)
 }

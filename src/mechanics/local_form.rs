@@ -58,13 +58,20 @@ impl<const D: usize> Tangent<'_, D> {
         self.connectivity().each_group(|group| {
             let (mut of_lanes, mut shares) = ([None; LANES], [Vector::<f64, 4>::zeros(); LANES]);
             let lanes = group.particles.iter().map(|&p| p as usize).enumerate();
+            let mut last = None;
             for (lane, p) in lanes.filter(|&(_, p)| self.mass.particles.is_solid(p)) {
                 let (at, share) = self.share_of_cell(p);
-                of_lanes[lane] = Some(*places.entry(at).or_insert_with(|| {
-                    form.push_cell(at, D.pow(4));
-                    form.cells.len() - 1
-                }));
-                shares[lane] = share;
+                // Particles of a cell lie beside each other.
+                let cell = last.filter(|(cell, _)| *cell == at).map_or_else(
+                    || {
+                        *places.entry(at).or_insert_with(|| {
+                            form.push_cell(at, D.pow(4));
+                            form.cells.len() - 1
+                        })
+                    },
+                    |(_, place)| place,
+                );
+                (last, of_lanes[lane], shares[lane]) = (Some((at, cell)), Some(cell), share);
             }
             let (own, slots) = distinct(&of_lanes);
             let mut sums = vec![Vector::<f64, 4>::zeros(); own.len()];

@@ -174,7 +174,7 @@ impl<const D: usize> LinearOperator for Bordered<'_, D> {
         self.tangent.apply(x, y);
         let along = vector::dot(bytemuck::cast_slice(self.direction), x);
         mutant!("path: its tangent forgets the loads": along = 0.0 * along);
-        self.slope.pool().axpy(along, bytemuck::cast_slice(&self.slope), y);
+        vector::axpy(along, bytemuck::cast_slice(&self.slope), y);
     }
 }
 

@@ -137,6 +137,20 @@ mod tests {
     }
 
     #[test]
+    fn a_column_falls_without_its_floor() -> Result<(), Box<dyn std::error::Error>> {
+        let scene = crate::scene::read_file("scenes/column_static.json".as_ref(), &[])?;
+        let mut simulation = scene.build::<2>("scenes".as_ref())?;
+        let found = |of: &crate::simulation::Simulation<2>| -> Result<_, Box<dyn std::error::Error>> {
+            let next = of.next_step()?;
+            Ok(loose(&of.grid, &next.equilibrium(), next.nodes()))
+        };
+        assert_eq!(found(&simulation)?, None);
+        simulation.loads.prescribed.clear();
+        assert_eq!(found(&simulation)?.and_then(|loose| loose.axis), Some(1));
+        Ok(())
+    }
+
+    #[test]
     fn a_square_is_loose_only_where_it_is_pushed() {
         let floor = [(0, 1), (1, 1)];
         // On a smooth floor the square stands, slides when pushed sideways, and stands again against a wall.

@@ -136,7 +136,7 @@ pub(crate) fn obstacles<const D: usize>(time: f64, loads: &Loads<D>, contacts: &
     for (obstacle, contact) in loads.contacts.obstacles.iter().zip(contacts) {
         add_contact(&mut row, &format!("{}_", obstacle.name), contact);
         row.push((format!("{}_work", obstacle.name), cell(contact.work)));
-        if obstacle.slides() {
+        if obstacle.has_friction() {
             row.push((format!("{}_friction_loss", obstacle.name), cell(contact.friction_loss)));
         }
         if let Some(body) = &obstacle.free {

@@ -95,8 +95,6 @@ impl<const D: usize> Recorder<D> {
     /// Continues the files of a run from `mark`. The simulation must be in its state at the mark. `reference` must belong to the start of
     /// the run. Rows written after the mark are cut off.
     ///
-    /// Example: [`Mark`].
-    ///
     /// # Errors
     /// The errors of [`Self::start`] and those of a mark that does not fit the files.
     pub fn resume<L: Law, A: ShapeFunction>(
@@ -160,8 +158,6 @@ impl<const D: usize> Recorder<D> {
 
     /// Syncs all files to disk and returns their ends, from which [`Self::resume`] continues. After a mark, `newton.jsonl` is kept when the
     /// run ends.
-    ///
-    /// Example: [`Mark`].
     ///
     /// # Errors
     /// The operating system refuses.

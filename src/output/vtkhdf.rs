@@ -290,6 +290,13 @@ mod tests {
         file.windows(text.len()).filter(|window| *window == text.as_bytes()).count()
     }
 
+    #[test]
+    fn a_folder_without_snapshots_is_an_error() -> std::result::Result<(), Box<dyn std::error::Error>> {
+        let folder = tempfile::tempdir()?;
+        assert!(matches!(pack(folder.path(), &[]), Err(OutputError::NoSnapshots(_))));
+        Ok(())
+    }
+
     /// `.ci/read_back.py` reads the blocks by the HDF5 library and by VTK.
     #[test]
     fn each_of_several_bodies_is_a_block() -> std::result::Result<(), Box<dyn std::error::Error>> {

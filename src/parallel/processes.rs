@@ -119,12 +119,13 @@ pub trait Message: Sized {
     /// Appends the numbers of the value.
     fn put(&self, to: &mut Vec<f64>);
 
-    /// The value from the next numbers. Numbers behind the last are zero.
+    /// The value from the next numbers. Numbers behind the last are NaN.
     fn take(from: &mut Iter<'_, f64>) -> Self;
 
-    /// A value that fills an array before the results are written: the one made of zeros.
-    fn unknown() -> Self {
-        Self::take(&mut [].iter())
+    /// The value made of zeros. It fills an array before the results are written.
+    fn blank() -> Self {
+        // No value has more numbers.
+        Self::take(&mut [0.0; 128].iter())
     }
 }
 
@@ -134,7 +135,7 @@ impl Message for f64 {
     }
 
     fn take(from: &mut Iter<'_, f64>) -> Self {
-        from.next().copied().unwrap_or_default()
+        from.next().copied().unwrap_or(f64::NAN)
     }
 }
 

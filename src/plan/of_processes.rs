@@ -3,7 +3,7 @@
 use super::Plan;
 use crate::approximation::ShapeFunction;
 use crate::material::Law;
-use crate::mechanics::sweep::ConnectivityError;
+use crate::mechanics::sweep::ShapeFunctionError;
 use crate::simulation::Simulation;
 use crate::tensor::Vector;
 use indicatif::BinaryBytes;
@@ -48,7 +48,7 @@ impl ProcessUse {
         simulation: &Simulation<D, L, A>,
         plan: &Plan,
         processes: usize,
-    ) -> Result<Self, ConnectivityError> {
+    ) -> Result<Self, ShapeFunctionError> {
         let sum = |shared: bool| plan.arrays.iter().filter(|one| one.is_shared == shared).map(|one| one.bytes).sum();
         let (shared, mut whole): (u64, u64) = (sum(true), sum(false));
         if processes <= 1 {

@@ -5,7 +5,7 @@ use crate::approximation::ShapeFunction;
 use crate::gpu::{Gpu, GpuError};
 use crate::lanes::LANES;
 use crate::material::Law;
-use crate::mechanics::sweep::ConnectivityError;
+use crate::mechanics::sweep::ShapeFunctionError;
 use crate::mechanics::tangent::tangent_bytes;
 use crate::mechanics::terms::dilatation_rows;
 use crate::particles::Body;
@@ -28,7 +28,7 @@ impl DeviceUse {
     /// A particle has no shape functions.
     pub fn of<const D: usize, L: Law, A: ShapeFunction>(
         simulation: &Simulation<D, L, A>,
-    ) -> Result<Self, ConnectivityError> {
+    ) -> Result<Self, ShapeFunctionError> {
         let connectivity = simulation.new_connectivity(None)?;
         let (settings, nodes) = (&simulation.settings, connectivity.active().len());
         let by_lane = connectivity.groups() * LANES * NUMBER;

@@ -19,7 +19,7 @@ pub(super) fn agreed<R>(processes: &Processes, result: Result<R, Failure>) -> Re
     }
 }
 
-/// Refuses other values of `own` in other processes than in process 0. `difference` says what the first of them does.
+/// Refuses processes whose `own` differs from that of process 0. `difference` completes the sentence "process N …".
 fn refuse_other<K: Pod + PartialEq>(processes: &Processes, own: K, difference: &str) -> Result<(), String> {
     processes.first_other(own).map_or(Ok(()), |rank| Err(format!("process {rank} {difference}")))
 }

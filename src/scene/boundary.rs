@@ -101,13 +101,13 @@ pub struct Rotation {
 
 /// A motion that a scene gives.
 #[derive(Clone, Copy)]
-pub(super) enum MotionOf<'a> {
+pub(super) enum GivenMotion<'a> {
     Displacement(&'a Table),
     Velocity(&'a Table),
     Rotation(&'a Rotation),
 }
 
-impl<'a> MotionOf<'a> {
+impl<'a> GivenMotion<'a> {
     /// The motions that are given by the keys `displacement`, `velocity` and `rotation`.
     pub(super) fn all(
         displacement: &'a Option<Table>,
@@ -159,9 +159,9 @@ impl<'a> MotionOf<'a> {
     }
 }
 
-/// Checks motions, or the mass of a free obstacle, of which at most one may be given.
+/// Checks motions and a free obstacle, of which at most one may be given.
 pub(super) fn check_motions(
-    given: &[MotionOf<'_>],
+    given: &[GivenMotion<'_>],
     free: Option<&Free>,
     problems: &mut Problems,
     path: &str,
@@ -177,11 +177,11 @@ pub(super) fn check_motions(
 
 impl Face {
     /// The motion, if the nodes have one.
-    pub(super) fn given(&self) -> Option<MotionOf<'_>> {
+    pub(super) fn given(&self) -> Option<GivenMotion<'_>> {
         match self {
-            Self::Displacement(table) => Some(MotionOf::Displacement(table)),
-            Self::Velocity(table) => Some(MotionOf::Velocity(table)),
-            Self::Rotation(rotation) => Some(MotionOf::Rotation(rotation)),
+            Self::Displacement(table) => Some(GivenMotion::Displacement(table)),
+            Self::Velocity(table) => Some(GivenMotion::Velocity(table)),
+            Self::Rotation(rotation) => Some(GivenMotion::Rotation(rotation)),
             Self::Free | Self::Sliding | Self::Fixed | Self::Held(_) => None,
         }
     }
@@ -233,8 +233,8 @@ impl Prescribed {
     }
 
     /// All given motions; a checked scene has exactly one.
-    pub(super) fn given(&self) -> Vec<MotionOf<'_>> {
-        MotionOf::all(&self.displacement, &self.velocity, &self.rotation)
+    pub(super) fn given(&self) -> Vec<GivenMotion<'_>> {
+        GivenMotion::all(&self.displacement, &self.velocity, &self.rotation)
     }
 }
 

@@ -1,4 +1,4 @@
-//! Builds a simulation from a checked scene. Here and nowhere else, the dimension becomes a type: see [`Scene::dimension`].
+//! Builds a simulation from a checked scene, whose dimension is a type here: see [`Scene::dimension`].
 
 use super::boundary::Prescribed;
 use super::curve::Curve;

@@ -1,6 +1,6 @@
 //! The loads of a scene: body forces, held faces and regions, loads on surfaces.
 
-use super::boundary::{Along, Face, MotionOf, Table};
+use super::boundary::{Along, Face, GivenMotion, Table};
 use super::filling::Builder;
 use super::load::{Loaded, Pressure, Stress, Traction};
 use super::vector::vector;
@@ -126,7 +126,7 @@ impl Face {
     }
 }
 
-impl MotionOf<'_> {
+impl GivenMotion<'_> {
     /// The motion of each component.
     pub(super) fn motion<const D: usize>(self) -> Result<[Option<Motion<D>>; D], CurveError> {
         match self {

@@ -84,7 +84,7 @@ impl MeshFile {
 /// let file = tempfile::Builder::new().suffix(".msh").tempfile()?;
 /// std::fs::write(file.path(), text)?;
 /// let part: Shape<2> = read_group(file.path(), "part")?;
-/// assert!(part.contains(&Vector::from([0.3, 0.3])) && !part.contains(&Vector::from([0.6, 0.6])));
+/// assert!(part.signed_distance(&Vector::from([0.3, 0.3])) < 0.0 && part.signed_distance(&Vector::from([0.6, 0.6])) > 0.0);
 /// let side: Shape<2> = read_group(file.path(), "side")?;
 /// assert_eq!(side.signed_distance(&Vector::from([0.5, 0.25])), 0.25);
 /// let error = read_group::<2>(file.path(), "top").unwrap_err().to_string();

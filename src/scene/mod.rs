@@ -283,7 +283,7 @@ impl Scene {
             problems.refuse(&format!("pressures[{i}]"), "a follower pressure", allowed);
         }
         for (name, face) in self.boundary.faces() {
-            let moves = face.and_then(boundary::Face::given).is_some_and(boundary::MotionOf::moves);
+            let moves = face.and_then(boundary::Face::given).is_some_and(boundary::GivenMotion::moves);
             problems.require(!moves, &format!("boundary.{name}"), "a motion", allowed);
         }
         for (i, prescribed) in self.prescribed.iter().enumerate() {

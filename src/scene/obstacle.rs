@@ -1,6 +1,6 @@
 //! Rigid obstacles.
 
-use super::boundary::{MotionOf, Rotation, Table, check_motions};
+use super::boundary::{GivenMotion, Rotation, Table, check_motions};
 use super::free::Free;
 use super::shape::Shape;
 use crate::mechanics::loads::ContactConstants;
@@ -65,8 +65,8 @@ impl Obstacle {
     }
 
     /// All given motions; a checked scene has at most one.
-    pub(super) fn given(&self) -> Vec<MotionOf<'_>> {
-        MotionOf::all(&self.displacement, &self.velocity, &self.rotation)
+    pub(super) fn given(&self) -> Vec<GivenMotion<'_>> {
+        GivenMotion::all(&self.displacement, &self.velocity, &self.rotation)
     }
 
     /// A warning about an obstacle that nothing can touch, or whose stiffness gains nothing.

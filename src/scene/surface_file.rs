@@ -60,7 +60,8 @@ impl SurfaceFile {
 /// let file = tempfile::Builder::new().suffix(".ply").tempfile()?;
 /// std::fs::write(file.path(), text)?;
 /// let corner = Shape::from(read_file(file.path())?);
-/// assert!(corner.contains(&Vector::from([0.1, 0.1, 0.1])) && !corner.contains(&Vector::from([0.5, 0.5, 0.5])));
+/// let distance = |x: f64| corner.signed_distance(&Vector::from([x; 3]));
+/// assert!(distance(0.1) < 0.0 && distance(0.5) > 0.0);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///

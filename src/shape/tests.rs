@@ -258,12 +258,3 @@ fn outlines_that_bound_no_polygon_are_refused_with_the_vertices() {
     // A vertex on a straight line is no fault.
     assert!(Polygon::new([a, [1.0, 0.0], b, c, d].map(vector).to_vec()).is_ok());
 }
-
-/// A tolerance admits a node that round-off moves off the surface.
-#[test]
-fn a_half_space_holds_a_node_that_rounding_moves_out() {
-    // The node at y = −0.3 + 3 · 0.1 = 5.6e-17, and the half-space y ≤ 0.
-    let below = Shape::from(HalfSpace { point: Vector::zeros(), normal: Vector::from([0.0, 1.0]) });
-    let node = Vector::from([0.0, -0.3 + 3.0 * 0.1]);
-    assert!(!below.contains(&node) && below.holds(&node, 0.1));
-}

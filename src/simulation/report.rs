@@ -6,7 +6,7 @@ use crate::mechanics::check::CheckError;
 use crate::mechanics::loads::Reaction;
 use crate::mechanics::residual::Inadmissible;
 use crate::mechanics::rigid::Loose;
-use crate::mechanics::sweep::ConnectivityError;
+use crate::mechanics::sweep::ShapeFunctionError;
 use crate::phases::Stopwatch;
 use crate::solver::{LinearError, NewtonError, NewtonFailure, NewtonHistory, NewtonReport};
 use crate::tensor::Vector;
@@ -143,7 +143,7 @@ pub struct BareParticle {
 pub enum StepError {
     /// Shape functions could not be evaluated.
     #[error("the shape functions cannot be evaluated")]
-    Support(#[from] ConnectivityError),
+    ShapeFunctions(#[from] ShapeFunctionError),
     /// Velocities are so large that their projection overflows.
     #[error("the projection to the nodes failed")]
     Projection(#[from] LinearError),

@@ -49,10 +49,9 @@ pub struct Settings {
     pub newton: NewtonSettings,
     /// The preconditioner of the linear systems, built anew in each step.
     pub preconditioner: Preconditioning,
-    /// The largest allowed local error of a step, in grid spacings: see
-    /// `Update::local_error`. A step with a larger error is repeated with half its
-    /// length, as often as the clock allows. The step grows back only when its error is small. `None` for steps of given length, and
-    /// without inertia.
+    /// The largest allowed local error of a step: c Δt² Δa over the grid spacing, with the scheme's constant c. A step with a larger error is
+    /// repeated with half its length, as often as the clock allows. The step grows back only when its error is small. `None` for steps of
+    /// given length, and without inertia.
     pub error_tolerance: Option<f64>,
     /// The tangent is compared with dual numbers at the end of every so many steps.
     pub check_tangent: Option<NonZeroU64>,

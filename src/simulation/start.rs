@@ -7,7 +7,7 @@ use crate::mechanics::extension::extension;
 use crate::mechanics::loads::{PrescribedDof, at_surface_points, prescribed_dofs};
 use crate::mechanics::residual::Equilibrium;
 use crate::mechanics::schemes::Alphas;
-use crate::mechanics::sweep::{Connectivity, ConnectivityError, Fields, Points};
+use crate::mechanics::sweep::{Connectivity, Fields, Points, ShapeFunctionError};
 use crate::mechanics::terms;
 use crate::mechanics::transfer::{Nodal, Projection};
 use crate::solver::LinearError;
@@ -15,7 +15,7 @@ use crate::space::Nodes;
 
 impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// The shape functions of a step; those of the last step if the grid is not reset. The particles then lie in the order of the blocks.
-    pub(super) fn connectivity(&mut self) -> Result<Connectivity<D>, ConnectivityError> {
+    pub(super) fn connectivity(&mut self) -> Result<Connectivity<D>, ShapeFunctionError> {
         let resets = self.history.resets_grid();
         match self.workspace.connectivity.take() {
             Some(connectivity) if !resets && self.workspace.connectivity_is_valid => Ok(connectivity.with_no_pass()),
@@ -35,12 +35,12 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     pub(crate) fn new_connectivity(
         &self,
         spare: Option<Connectivity<D>>,
-    ) -> Result<Connectivity<D>, ConnectivityError> {
+    ) -> Result<Connectivity<D>, ShapeFunctionError> {
         Ok(self.aggregated(self.unaggregated(spare)?))
     }
 
     /// [`Self::new_connectivity`] where every node is an unknown.
-    fn unaggregated(&self, spare: Option<Connectivity<D>>) -> Result<Connectivity<D>, ConnectivityError> {
+    fn unaggregated(&self, spare: Option<Connectivity<D>>) -> Result<Connectivity<D>, ShapeFunctionError> {
         let Self { particles, bodies, loads, approximation, grid, settings, workspace, .. } = self;
         let fields = Fields::of(bodies, &particles.body);
         let processes = settings.processes.clone();

@@ -57,7 +57,8 @@ impl<const D: usize> Followers<D> {
 
     /// E on a device; `None` if every node is an unknown.
     pub(crate) fn on_device(&self, gpu: &Gpu) -> Option<gpu::Followers> {
-        (!self.is_empty()).then(|| gpu::Followers::new(gpu, self.extension.both(), self.follows.as_flattened()))
+        (!self.is_empty())
+            .then(|| gpu::Followers::new(gpu, self.extension.rows_and_transpose(), self.follows.as_flattened()))
     }
 
     /// The row of an outer node; `None` for other nodes.

@@ -133,11 +133,11 @@ impl Vectors for Pool {
     }
 
     fn axpy(&self, a: f64, x: &[f64], y: &mut [f64]) {
-        update(x, y, |x, y| a * x + y);
+        axpy(a, x, y);
     }
 
     fn xpby(&self, x: &[f64], b: f64, y: &mut [f64]) {
-        update(x, y, |x, y| x + b * y);
+        xpby(x, b, y);
     }
 
     fn scaled(&self, a: f64, x: &[f64], y: &mut [f64]) {
@@ -225,6 +225,16 @@ pub(crate) fn norm_with(square: f64, x: &[f64]) -> f64 {
     let (half, rest) = (2.0_f64.powi(-(k / 2)), 2.0_f64.powi(-(k - k / 2)));
     let scaled: Vec<f64> = x.iter().map(|x| x * half * rest).collect();
     dot(&scaled, &scaled).sqrt() / half / rest
+}
+
+/// `y ← a x + y`
+pub(crate) fn axpy(a: f64, x: &[f64], y: &mut [f64]) {
+    update(x, y, |x, y| a * x + y);
+}
+
+/// `y ← x + b y`
+pub(crate) fn xpby(x: &[f64], b: f64, y: &mut [f64]) {
+    update(x, y, |x, y| x + b * y);
 }
 
 /// `yᵢ ← f(xᵢ, yᵢ)`

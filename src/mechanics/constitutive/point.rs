@@ -3,7 +3,7 @@
 //! The code is generic over the number type. No function returns early, so a loop over particles is pure arithmetic. The compiler
 //! vectorises this loop if the law is pure arithmetic, too.
 
-use crate::material::{ClosedTangent, Law, MaterialState};
+use crate::material::{ClosedTangent, Law, MaterialState, first_piola};
 use crate::mechanics::kinematics::{compose, to_nodes};
 use crate::scalar::Real;
 use crate::tensor::{Tensor, identity, scaled};
@@ -41,9 +41,7 @@ pub(super) fn internal<L: Law, T: Real, const D: usize>(
     let f_left = identity::<T, D>() + h.map(|x| carried(x, part != Part::Material));
     let (at, det_f) = at_r.deformed(h.map(|x| carried(x, part != Part::Geometric))).admissible_or_rest();
     // P = F S (eq. 7)
-    let piola = f_left * law.stress(&at);
-    mutant!("laws: P = S F for F S": piola = law.stress(&at) * f_left);
-    (to_nodes(&piola, &at_r.f, volume), det_f)
+    (to_nodes(&first_piola(law, &f_left, &at), &at_r.f, volume), det_f)
 }
 
 /// δσ = V₀ δP F_rᵀ as a linear map of L = Σ u ⊗ ∇_r N.

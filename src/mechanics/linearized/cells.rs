@@ -1,6 +1,6 @@
 //! The linearised tangent of averaged cells, as rows of numbers.
 
-use super::{Along, FunctionsAt, Rows};
+use super::{Along, FunctionsAt, TangentRows};
 use crate::gpu::{self, Gpu};
 use crate::lanes::LANES;
 use crate::mechanics::constitutive::Form;
@@ -41,7 +41,7 @@ pub(crate) struct CellRows<const D: usize> {
     cells: Arc<Cells>,
     layout: CellLayout,
     /// 𝔸, a and b.
-    pub rows: Rows,
+    pub rows: TangentRows,
     /// k of every cell; in the mixed form γ.
     pub stiffness: Vec<f64>,
     /// The cells of the mixed form.
@@ -91,7 +91,7 @@ impl<const D: usize> CellRows<D> {
                 }
             }
         });
-        let rows = Rows::new(layout.form, 0, layout.count, rows);
+        let rows = TangentRows::new(layout.form, 0, layout.count, rows);
         Self { cells, layout, rows, stiffness, mixed: None }
     }
 

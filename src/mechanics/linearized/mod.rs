@@ -3,7 +3,7 @@
 //! | array | entries | its part of K u |
 //! |---|---|---|
 //! | α M̃ | nodes, particles | α (ε m_I u_I + Σ_p (1 − ε) m_p u_p N_I) |
-//! | [`Rows`] | particles | Σ_p (𝔸 : L) ∇_r N_I |
+//! | [`TangentRows`] | particles | Σ_p (𝔸 : L) ∇_r N_I |
 //! | [`CellRows`] | particles, averaged cells | Σ_p (𝔸 : L + δp a) ∇_r N_I with δp = k Σ_{q∈c} b_q : L_q |
 //! | [`PressureRows`] | points of loaded surfaces | Σ δ(p A cof(F) N) N_I |
 //! | [`ContactRows`] | points in contact | −Σ (∂f/∂x δx + ∂f/∂q δq) N_I |
@@ -16,7 +16,7 @@ mod rows;
 pub(crate) use cells::{CellLayout, CellRows, MixedCell};
 pub(crate) use contact::{ContactRow, ContactRows};
 pub(crate) use pressure::{PressureRow, PressureRows};
-pub(crate) use rows::Rows;
+pub(crate) use rows::TangentRows;
 
 use crate::gpu::{self, Gpu};
 use crate::mechanics::effective::Function;
@@ -30,7 +30,7 @@ pub(crate) struct Linearized<const D: usize> {
     /// α, the factor of M̃.
     pub mass: f64,
     /// The tangents of the laws.
-    pub stresses: Vec<Rows>,
+    pub stresses: Vec<TangentRows>,
     /// The tangents of averaged cells.
     pub cells: Vec<CellRows<D>>,
     /// Follower pressures.

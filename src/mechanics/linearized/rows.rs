@@ -9,7 +9,7 @@ use std::sync::{Arc, OnceLock};
 
 /// δσ = 𝔸 : L at all particles, one particle per lane.
 #[derive(Clone, Debug)]
-pub(crate) struct Rows {
+pub(crate) struct TangentRows {
     form: Form,
     /// The first group that has rows.
     first: usize,
@@ -21,7 +21,7 @@ pub(crate) struct Rows {
     copy: Arc<OnceLock<Arc<Buffer<f64>>>>,
 }
 
-impl Rows {
+impl TangentRows {
     /// Tangents that are stored in `form`, from the group `first` on. Each group has `count` rows.
     pub(crate) fn new(form: Form, first: usize, count: usize, rows: Pooled<[f64; LANES]>) -> Self {
         Self { form, first, count, rows: Arc::new(rows), factor: 1.0, copy: Arc::default() }

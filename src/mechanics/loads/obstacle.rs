@@ -21,9 +21,9 @@ impl ContactConstants {
         self.friction > 0.0
     }
 
-    /// The constants with the stiffness in another unit, one of which is `unit` of these.
-    pub(crate) fn scaled(&self, unit: f64) -> Self {
-        Self { stiffness: self.stiffness * unit, ..*self }
+    /// The constants with the stiffness times a factor.
+    pub(crate) fn scaled(&self, factor: f64) -> Self {
+        Self { stiffness: self.stiffness * factor, ..*self }
     }
 }
 
@@ -100,19 +100,19 @@ impl<const D: usize> Obstacle<D> {
         Self { name, shape, motion, free: None, surface, constants, anchors, work, friction_loss }
     }
 
-    /// Whether friction acts on what slides on the obstacle.
-    pub(crate) fn slides(&self) -> bool {
+    /// Whether friction acts on the obstacle.
+    pub(crate) fn has_friction(&self) -> bool {
         self.constants.has_friction()
     }
 
-    /// The anchors of points that touch nothing: their positions, in the frame of an obstacle at `pose`. None without friction.
+    /// The anchors of points that touch nothing: their positions, in the frame of an obstacle at `pose`. Empty without friction.
     pub(crate) fn anchors_at(
         &self,
         pose: &Pose<D>,
         points: &[SurfacePoint<D>],
         positions: &[Vector<f64, D>],
     ) -> Vec<Vector<f64, D>> {
-        let anchored = if self.slides() { points } else { &[] };
+        let anchored = if self.has_friction() { points } else { &[] };
         anchored.iter().map(|point| pose.to_frame(&positions[point.particle])).collect()
     }
 

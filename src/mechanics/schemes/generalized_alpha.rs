@@ -11,11 +11,11 @@ use serde::{Deserialize, Serialize};
 /// α_m = (2ρ − 1)/(ρ + 1),  α_f = ρ/(ρ + 1),  γ = ½ − α_m + α_f,  β = ¼ (1 − α_m + α_f)²
 ///
 /// ```
-/// use bfree::mechanics::schemes::{GeneralizedAlpha, Scheme};
+/// use bfree::mechanics::schemes::{GeneralizedAlpha, Newmark, Scheme};
 ///
 /// // ρ = 1 damps nothing: forces are in balance halfway, and the end of the step follows the trapezoidal rule.
 /// let midpoint = GeneralizedAlpha { spectral_radius: 1.0 };
-/// assert_eq!((midpoint.instant(), midpoint.newmark().beta, midpoint.newmark().gamma), (0.5, 0.25, 0.5));
+/// assert_eq!((midpoint.instant(), midpoint.end(0.1)), (0.5, Newmark { beta: 0.25, gamma: 0.5 }.end(0.1)));
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

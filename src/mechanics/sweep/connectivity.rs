@@ -3,7 +3,7 @@
 use super::columns::WIDEST;
 use super::group::Group;
 use super::plain::Plain;
-use super::points::{ConnectivityError, Points};
+use super::points::{Points, ShapeFunctionError};
 use super::tiled::Tiled;
 use super::{Each, shares};
 use crate::aggregation::Extension;
@@ -92,7 +92,7 @@ impl<const D: usize> Connectivity<D> {
         approximation: &A,
         grid: &Grid<D>,
         positions: &[Vector<f64, D>],
-    ) -> Result<(Self, Nodes), ConnectivityError> {
+    ) -> Result<(Self, Nodes), ShapeFunctionError> {
         Self::rebuilt(None, approximation, grid, &Points::at(positions), &Pool::default())
     }
 
@@ -127,7 +127,7 @@ impl<const D: usize> Connectivity<D> {
         grid: &Grid<D>,
         points: &Points<'_, D>,
         pool: &Pool,
-    ) -> Result<(Self, Nodes), ConnectivityError> {
+    ) -> Result<(Self, Nodes), ShapeFunctionError> {
         let (implementation, nodes) = match approximation.separable() {
             Some(product) if product.width() <= WIDEST => {
                 let reused = reused.and_then(|reused| match reused.implementation {
@@ -178,7 +178,7 @@ impl<const D: usize> Connectivity<D> {
         approximation: &A,
         grid: &Grid<D>,
         positions: &[Vector<f64, D>],
-    ) -> Result<(Self, Nodes), ConnectivityError> {
+    ) -> Result<(Self, Nodes), ShapeFunctionError> {
         let points = Points::at(positions);
         let (plain, nodes) = Plain::new(approximation, grid, &points)?;
         Ok((Self::of_implementation(Implementation::Plain(plain), grid, &nodes, &points, &Pool::default()), nodes))

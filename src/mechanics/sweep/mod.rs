@@ -56,7 +56,7 @@ pub use group::{At, Group};
 pub(crate) use lattice::stride;
 pub use mode::{Mode, Weights};
 pub use number::Number;
-pub use points::{ConnectivityError, Points};
+pub use points::{Points, ShapeFunctionError};
 
 use block::Block;
 
@@ -66,7 +66,7 @@ type Point<'a, const C: usize, const D: usize> = dyn Fn(Group<'_>, &[At<f64, C, 
 /// `(group, u and L of every field, results)`: writes the results of the group.
 type Evaluate<'a, R, const C: usize, const D: usize> = dyn Fn(Group<'_>, &[At<f64, C, D>], &mut [R]) + Sync + 'a;
 
-/// The owners of the results of a pass.
+/// Whether a pass has one result for each particle, or several for each group.
 #[derive(Clone, Copy)]
 enum Each {
     Particle,

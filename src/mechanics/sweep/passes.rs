@@ -61,7 +61,7 @@ impl<const D: usize> Connectivity<D> {
 
     /// `evaluate(group)` of all groups, in the order of their numbers.
     pub(crate) fn map_groups<R: Clone + Send + Message>(&self, evaluate: impl Fn(Group<'_>) -> R + Sync) -> Vec<R> {
-        let mut results = vec![R::unknown(); self.groups()];
+        let mut results = vec![R::blank(); self.groups()];
         let evaluate = |group: Group<'_>, _: &[At<f64, D, D>], results: &mut [R]| results[0] = evaluate(group);
         let own = &mut results[self.own_groups()];
         dispatch!(self, one => one.results(Each::Group(1), 0, None, Mode::BOTH, &evaluate, own));
@@ -195,7 +195,7 @@ impl<const D: usize> Connectivity<D> {
     ) -> Pooled<X> {
         let (field, own) = (bytemuck::cast_slice(field), self.own_places());
         let point = |_: usize, at: &[At<f64, C, D>], lane: usize| point(&at[0], lane);
-        // Without the order of the passes in memory, the own particles are all particles.
+        // If particles do not lie in the order of the passes, every process needs all of them.
         if own_alone && self.is_memory_order() {
             let mut results = self.pool().unspecified(own.len(), X::zero());
             self.at_own_particles(1, field, mode, &mut results, point);
@@ -234,7 +234,7 @@ impl<const D: usize> Connectivity<D> {
             let gradient = Tensor::from_fn(|c, k| T::from_fields(|i| fields[i].gradient[c][k][lane]));
             point(p, value, gradient)
         };
-        let mut results = vec![R::unknown(); self.particles()];
+        let mut results = vec![R::blank(); self.particles()];
         self.at_own_particles(T::FIELDS, &T::flat(field), Mode::BOTH, &mut results[self.own_places()], point);
         self.in_memory_order(&mut results, |tiled, results| tiled.share_results(Each::Particle, results));
         results
@@ -294,7 +294,7 @@ impl<const D: usize> Connectivity<D> {
         let results = self.evaluate(field, |p, value, gradient| {
             point(p, value, gradient).unwrap_or_else(|error| {
                 failure.keep(p, error);
-                R::unknown()
+                R::blank()
             })
         });
         failure.check(self.processes())?;

@@ -3,7 +3,7 @@
 
 use super::blocks::Quadratic;
 use super::group::{At, Group};
-use super::points::{ConnectivityError, Points};
+use super::points::{Points, ShapeFunctionError};
 use super::{Each, Evaluate, Mode, Point};
 use crate::approximation::{Scratch, ShapeFunction, Support};
 use crate::grid::Grid;
@@ -39,7 +39,7 @@ impl<const D: usize> Plain<D> {
         approximation: &A,
         grid: &Grid<D>,
         points: &Points<'_, D>,
-    ) -> Result<(Self, Nodes), ConnectivityError> {
+    ) -> Result<(Self, Nodes), ShapeFunctionError> {
         let particles: Vec<u32> = (0..points.positions.len() as u32).collect();
         let tasks: Vec<_> = particles.chunks(TASK * LANES).collect();
         let lists = parallel::map(tasks.len(), &|task| lists(approximation, grid, points, tasks[task]));
@@ -196,7 +196,7 @@ impl<const D: usize> Plain<D> {
 }
 
 /// The shape functions of particles by the grid numbers of the nodes, and the numbers of all nodes in these lists.
-type Lists<const D: usize> = (Vec<Vec<Entry<u64, D>>>, Vec<u64>);
+type ListsOfParticles<const D: usize> = (Vec<Vec<Entry<u64, D>>>, Vec<u64>);
 
 /// The shape functions of `particles`.
 ///
@@ -207,14 +207,14 @@ fn lists<A: ShapeFunction, const D: usize>(
     grid: &Grid<D>,
     points: &Points<'_, D>,
     particles: &[u32],
-) -> Result<Lists<D>, ConnectivityError> {
+) -> Result<ListsOfParticles<D>, ShapeFunctionError> {
     let mut scratch = Scratch::default();
     let mut support = Support::default();
     let mut lists: Vec<Vec<Entry<u64, D>>> = Vec::with_capacity(particles.len());
     for &p in particles {
         approximation
             .evaluate(grid, &points.positions[p as usize], &mut scratch, &mut support)
-            .map_err(|source| ConnectivityError { particle: points.id(p as usize), source })?;
+            .map_err(|source| ShapeFunctionError { particle: points.id(p as usize), source })?;
         let (extrapolation, field) = (points.extrapolation.get(&p), points.fields.field(p as usize));
         let nodes = support.nodes.iter().zip(&support.values).zip(&support.gradients);
         let entry = |((&index, &n), &gradient): ((_, &f64), &[f64; D])| {

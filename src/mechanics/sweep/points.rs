@@ -39,7 +39,7 @@ impl<'a, const D: usize> Points<'a, D> {
 /// The shape functions of a particle could not be evaluated.
 #[derive(Clone, Debug, thiserror::Error)]
 #[error("particle {particle} has no shape functions")]
-pub struct ConnectivityError {
+pub struct ShapeFunctionError {
     /// Id of the particle; its index in memory where no ids are given.
     pub particle: usize,
     /// The error of the shape functions.

@@ -10,7 +10,7 @@ use super::foreign::Foreign;
 use super::group::Group;
 use super::numbering::number;
 use super::order::{self, Key};
-use super::points::{ConnectivityError, Points};
+use super::points::{Points, ShapeFunctionError};
 use super::shares::Shares;
 use crate::approximation::{ApproximationError, Scratch, Separable, ShapeFunction, Support};
 use crate::grid::Grid;
@@ -52,7 +52,7 @@ impl<const D: usize> Tiled<D> {
         points: &Points<'_, D>,
         reused: Option<Self>,
         pool: &Pool,
-    ) -> Result<(Self, Nodes), ConnectivityError> {
+    ) -> Result<(Self, Nodes), ShapeFunctionError> {
         let positions = &*points.positions;
         let outside = || ApproximationError::Outside { position: Vec::new(), lower: Vec::new(), upper: Vec::new() };
         // Threads meet errors in any order. So the particle with the smallest id is searched, with the error for its whole position.
@@ -61,7 +61,7 @@ impl<const D: usize> Tiled<D> {
             let mut error = |x: &Vector<f64, D>| approximation.evaluate(grid, x, &mut scratch, &mut support).err();
             let failing = positions.iter().enumerate().filter_map(|(p, x)| Some((points.id(p), error(x)?)));
             let (particle, source) = failing.min_by_key(|&(id, _)| id).unwrap_or((points.id(particle), source));
-            ConnectivityError { particle, source }
+            ShapeFunctionError { particle, source }
         };
         let Self { mut blocks, mut ranges, slots, keys, .. } = reused.unwrap_or_default();
         let keys = order::sorted(grid, points, keys).map_err(|particle| failure(particle, outside()))?;

@@ -8,7 +8,7 @@ use super::term::{Role, Step, Sum, Term, summed};
 use crate::material::Law;
 use crate::mechanics::constitutive::Part;
 use crate::mechanics::kinematics::Inadmissible;
-use crate::mechanics::linearized::{CellRows, Linearized, Rows};
+use crate::mechanics::linearized::{CellRows, Linearized, TangentRows};
 use crate::mechanics::loads::Rayleigh;
 use crate::mechanics::schemes::Alphas;
 use crate::mechanics::sweep::Number;
@@ -41,7 +41,7 @@ impl<'a, const D: usize, L: Law> Damping<'a, D, L> {
 
     /// The material part of the stiffness at φ_n, the nodal motion since the last grid reset, without U(J) of averaged bodies: the mean stress of
     /// a step without motion lacks U(J), and has the stiffness of the law.
-    fn stiffness(step: &Step<'a, D, L>) -> Result<Rows, Inadmissible> {
+    fn stiffness(step: &Step<'a, D, L>) -> Result<TangentRows, Inadmissible> {
         let motion: Vec<_> = step.nodal.moved(step.connectivity.nodes()).collect();
         let averages = step.bodies.iter().any(Body::averages);
         mutant!("damping: particles of averaged cells have the stiffness of U(J)": averages = false);

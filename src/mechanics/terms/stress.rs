@@ -5,7 +5,7 @@ use crate::lanes::LANES;
 use crate::material::Law;
 use crate::mechanics::constitutive::{Laws, Part};
 use crate::mechanics::kinematics::{Inadmissible, Kinematics};
-use crate::mechanics::linearized::{Linearized, Rows};
+use crate::mechanics::linearized::{Linearized, TangentRows};
 use crate::mechanics::sweep::{Connectivity, Mode, Number, Weights};
 use crate::mechanics::trial::Trial;
 use crate::parallel::First;
@@ -28,7 +28,7 @@ impl<'a, const D: usize, L: Law> Stress<'a, D, L> {
     }
 
     /// The tangent linearised at φ, whole or one `part`.
-    pub(super) fn linearized(&self, phi: &[Vector<f64, D>], part: Part) -> Result<Rows, Inadmissible> {
+    pub(super) fn linearized(&self, phi: &[Vector<f64, D>], part: Part) -> Result<TangentRows, Inadmissible> {
         let form = self.laws.form();
         let count = form.rows(D);
         let own = self.connectivity.own_groups();
@@ -41,7 +41,7 @@ impl<'a, const D: usize, L: Law> Stress<'a, D, L> {
             }
         });
         failure.check(self.connectivity.processes())?;
-        Ok(Rows::new(form, own.start, count, rows))
+        Ok(TangentRows::new(form, own.start, count, rows))
     }
 }
 

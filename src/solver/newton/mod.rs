@@ -15,7 +15,7 @@ use super::forcing::LOOSEST;
 use super::gmres::GmresSettings;
 use super::{LinearOutcome, LinearReport, Linearization, NonlinearProblem, Preconditioner, System};
 use crate::pooled::{Pool, Pooled};
-use crate::space::vector::{Vectors, dot, norm};
+use crate::space::vector::{Vectors, dot, norm, xpby};
 use settings::DEFAULT_RESTART;
 
 /// The part of the predicted decrease that a step must achieve (Armijo).
@@ -264,7 +264,7 @@ impl<E: std::error::Error + 'static> Newton<'_, E> {
         for halvings in 0..=MAX_HALVINGS {
             length = 0.5_f64.powi(halvings);
             self.trial.copy_from_slice(d);
-            self.r.pool().xpby(self.x, length, &mut self.trial);
+            xpby(self.x, length, &mut self.trial);
             self.history.counts.residuals += 1;
             self.history.counts.line_search += usize::from(halvings > 0);
             if let Err(why) = self.problem.residual(&self.trial, &mut self.r_trial) {

@@ -1,8 +1,7 @@
 //! Chebyshev polynomials over block-Jacobi, and the largest eigenvalue that they need.
 
-use crate::pooled::Pool;
 use crate::solver::LinearOperator;
-use crate::space::vector::{Vectors, dot};
+use crate::space::vector::{Vectors, axpy, dot, xpby};
 use nalgebra::DMatrix;
 
 /// A Chebyshev polynomial.
@@ -32,7 +31,6 @@ const MARGIN: f64 = 1.15;
 /// time do not change their bits.
 pub(super) fn largest(operator: &dyn LinearOperator, jacobi: &dyn LinearOperator, n: usize) -> f64 {
     let start: Vec<f64> = (1..=n).map(|i| 2.0 * (i as f64 * 0.618_033_988_749_894_9).fract() - 1.0).collect();
-    let vectors = Pool::default();
     let (mut r, mut z, mut w) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
     // A product clears the entries at prescribed unknowns. It comes first, because there D is 1 in any units.
     operator.apply(&start, &mut w);
@@ -50,7 +48,7 @@ pub(super) fn largest(operator: &dyn LinearOperator, jacobi: &dyn LinearOperator
             break;
         }
         matrix[(step, step)] = 1.0 / alpha + carried;
-        vectors.axpy(-alpha, &w, &mut r);
+        axpy(-alpha, &w, &mut r);
         jacobi.apply(&r, &mut z);
         let r_z_next = dot(&r, &z);
         let beta = r_z_next / r_z;
@@ -60,7 +58,7 @@ pub(super) fn largest(operator: &dyn LinearOperator, jacobi: &dyn LinearOperator
         if step + 1 < ESTIMATE {
             (matrix[(step, step + 1)], matrix[(step + 1, step)]) = (beta.sqrt() / alpha, beta.sqrt() / alpha);
         }
-        vectors.xpby(&z, beta, &mut p);
+        xpby(&z, beta, &mut p);
         carried = beta / alpha;
         r_z = r_z_next;
     }

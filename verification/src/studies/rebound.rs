@@ -215,8 +215,8 @@ fn configurations() -> Result<Sheet, StudyError> {
 
 const REMARKS: [&str; 3] = [
     "Where the energy goes. With walls at rest the change of energy in a step is (a) what the transfer takes, Δv·(M_L − M)Δv/2, never negative, because \
-     increments of nodal velocity weigh M_L on the nodes and M on the particles; (b) what comes from the forces as quadrature points change connectivity, \
-     −Δφ·(M_L a_n + f_n)/2, because the accelerations brought along balance the forces on the old connectivity; (c) what Newmark's rule takes. The books of \
+     increments of nodal velocity weigh M_L on the nodes and M on the particles; (b) what comes from the forces as quadrature points change supports, \
+     −Δφ·(M_L a_n + f_n)/2, because the accelerations brought along balance the forces on the old supports; (c) what Newmark's rule takes. The books of \
      whole runs were kept up to commit da03366, and balanced to round-off. With the trapezoidal rule (c) is nothing to three digits and (b) gives back a \
      little: the whole loss is (a), for every shape function. So it is neither \"a poor stress integration\", as the paper supposes, nor the rule; the loss \
      falls with Δt and with eps, as (a) says (study `order`). With γ = 0.6 the rule takes about a third of the loss.",

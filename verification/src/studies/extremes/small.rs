@@ -138,7 +138,7 @@ fn lonely<const D: usize>(name: &str, shape: &Approximation, lumping: f64, repor
 fn outside<const D: usize>(report: &mut Report) {
     let place = Place { name: "", at: -1e-300, axes: 1, others: 3.0 };
     let answers: Vec<_> = families().iter().map(|(_, shape)| lone::<D>(&place, shape, 1.0).0.step()).collect();
-    let expected = |error: &StepError| matches!(error, StepError::Support(_));
+    let expected = |error: &StepError| matches!(error, StepError::ShapeFunctions(_));
     refused(report, &format!("every family, D = {D}"), "1e-300 outside", "Support", answers, expected);
 }
 
