@@ -10,6 +10,7 @@ use rayon::prelude::*;
 use serde_json::Value;
 use std::collections::{HashMap, HashSet};
 use std::io::{self, BufRead, BufReader};
+use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus, Stdio};
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
@@ -159,28 +160,34 @@ fn attempt(programs: &Programs, check: Check, fault: Option<&str>) -> Result<Ver
     let program = programs.get(name).ok_or(ShippedFaultError::NotBuilt { name })?;
     let mut command = Command::new(program);
     command.args(arguments).current_dir(root());
-    command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::null());
+    command.stdin(Stdio::null()).stderr(Stdio::null());
     command.env_remove(VARIABLE).envs(fault.map(|fault| (VARIABLE, fault)));
     // Checks run side by side; the results do not depend on the number of threads, and tests of threads start their own.
     command.env("RAYON_NUM_THREADS", "1");
     // Inputs that a fault fails on are no regressions, and do not belong beside the sources.
     command.env("PROPTEST_DISABLE_FAILURE_PERSISTENCE", "true");
-    let failed = |source| ShippedFaultError::Start { command: format!("{}", program.display()), source };
-    let mut child = command.spawn().map_err(failed)?;
+    verdict(&mut command)
+        .map_err(|source| ShippedFaultError::Start { command: format!("{}", program.display()), source })
+}
+
+/// Runs a check until it ends, a test fails, or nobody waits any longer. Programs that the check has started end with it.
+fn verdict(command: &mut Command) -> io::Result<Verdict> {
+    let mut child = command.stdout(Stdio::piped()).process_group(0).spawn()?;
     let lines = child.stdout.take().map(|out| lines(BufReader::new(out)));
     let end = Instant::now() + PATIENCE;
     // Without a pipe there are no lines, and only the end of the program counts.
-    while let Some(line) = lines.as_ref().map(|lines| lines.recv_timeout(end.saturating_duration_since(Instant::now())))
-    {
-        let verdict = match line {
+    while let Some(lines) = &lines {
+        let early = match lines.recv_timeout(end.saturating_duration_since(Instant::now())) {
             Err(RecvTimeoutError::Disconnected) => break,
             Err(RecvTimeoutError::Timeout) => Verdict::Hangs,
             Ok(line) if line.ends_with(FAILED) => Verdict::Fails,
             Ok(_) => continue,
         };
-        return child.kill().and_then(|()| child.wait()).map(|_| verdict).map_err(failed);
+        Command::new("kill").args(["-KILL", "--", &format!("-{}", child.id())]).status()?;
+        child.wait()?;
+        return Ok(early);
     }
-    child.wait().map(|status| if status.success() { Verdict::Passes } else { Verdict::Fails }).map_err(failed)
+    Ok(if child.wait()?.success() { Verdict::Passes } else { Verdict::Fails })
 }
 
 /// The lines of a program, as it prints them.
@@ -188,4 +195,26 @@ fn lines(out: impl BufRead + Send + 'static) -> Receiver<String> {
     let (sender, lines) = mpsc::channel();
     spawn(move || out.lines().map_while(Result::ok).try_for_each(|line| sender.send(line)));
     lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The verdict on a shell script, and the seconds it takes.
+    fn of(script: &str) -> io::Result<(Verdict, u64)> {
+        let start = Instant::now();
+        Ok((verdict(Command::new("sh").args(["-c", script]))?, start.elapsed().as_secs()))
+    }
+
+    #[test]
+    fn the_first_test_that_fails_is_the_verdict() -> io::Result<()> {
+        assert_eq!(of("echo 'test a ... ok'")?.0, Verdict::Passes);
+        assert_eq!(of("echo 'test a ... ok'; exit 101")?.0, Verdict::Fails);
+        // Neither the rest of the tests nor a program that they have started is waited for.
+        let (verdict, seconds) = of("sleep 60 & echo 'test a ... FAILED'; sleep 60")?;
+        assert_eq!(verdict, Verdict::Fails);
+        assert!(seconds < 30, "{seconds} s");
+        Ok(())
+    }
 }
