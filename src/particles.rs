@@ -407,3 +407,23 @@ fn permute<T: Copy>(array: &mut [T], order: &[u32], moved: &mut [bool]) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_configuration_at_the_last_grid_reset_goes_with_the_particles() {
+        let mut particles = Particles::<1>::default();
+        [0.1, 0.2].into_iter().for_each(|x| particles.push_without_inertia(Vector::from([x]), 1.0, 1.0, 0));
+        let at_reset = |position: [f64; 2], dilatation: [f64; 2]| Configuration {
+            position: position.map(|x| Vector::from([x])).to_vec(),
+            displacement_gradient: position.map(Tensor::from_element).to_vec(),
+            dilatation: dilatation.to_vec(),
+        };
+        particles.reference = Some(at_reset([0.3, 0.4], [0.5, 0.6]));
+        particles.rearrange(&[1, 0]);
+        assert_eq!(particles.id, [1, 0]);
+        assert_eq!(particles.reference, Some(at_reset([0.4, 0.3], [0.6, 0.5])));
+    }
+}

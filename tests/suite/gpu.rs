@@ -1,7 +1,7 @@
 //! The GPU: its product and its solver against those of the processor. The kernels run on a driver that gcc makes of them
 //! (`tests/gpu/driver.c`), with threads and blocks as loops in three orders. The program finds it like the real one.
 
-use crate::free_obstacles::{flying, flying_3d};
+use crate::rigid_bodies::{flying, flying_3d};
 use crate::support::{Failure, Said, built, said, scene};
 use bfree::gpu::{Gpu, GpuError};
 use bfree::mechanics::check::direction;

@@ -7,9 +7,9 @@
 pub(super) enum Check {
     /// A study of this program.
     Study(&'static str),
-    /// Tests of the library's test program, by the common beginning of their names.
+    /// Tests of the library's test program, by a part of their names, such as that of their module.
     Test(&'static str),
-    /// Unit tests of the library, by the common beginning of their names.
+    /// Unit tests of the library, by a part of their names.
     Unit(&'static str),
 }
 
@@ -52,12 +52,13 @@ const RESTARTS: Check = Check::Test("restart::");
 const TOUCHES: Check = Check::Study("contact");
 const OBSTACLES: Check = Check::Test("obstacles::");
 const BETWEEN: Check = Check::Test("between::");
-const FREE: Check = Check::Test("free_obstacles::");
+const FREE: Check = Check::Test("rigid_bodies::");
 const ENERGY: Check = Check::Study("energy");
 const MEAN: Check = Check::Unit("mechanics::constitutive::discrete_gradient");
 const CONTACT_LAW: Check = Check::Unit("mechanics::contact");
 const SOLVER: Check = Check::Unit("solver::");
 const SOLIDS: Check = Check::Unit("shape::");
+const PARTICLES: Check = Check::Unit("particles::");
 const STORED: Check = Check::Unit("checkpoint::");
 
 /// A fault in a shipped file.
@@ -99,7 +100,7 @@ pub(super) const FAULTS: &[ShippedFault] = &[
     fault("damping: averaged cells have no stiffness of their own", DAMPED, POINTS),
     fault("mean dilatation: the product lacks the coupling within a cell", TANGENT, POINTS),
     fault("mean dilatation: that of earlier grids is forgotten", CELLS, POINTS),
-    fault("mean dilatation: means of a kept grid stay where particles were", CELLS, KEPT),
+    fault("mean dilatation: means of a kept grid stay where particles were", PARTICLES, KEPT),
     fault("mean dilatation: hardly filled cells have a dilatation of their own", INCOMPRESSIBLE, LAWS),
     fault("mixed: the product lacks the compressibility", INCOMPRESSIBLE, POINTS),
     fault("mixed: the residual of a cell is that of half its volume", INCOMPRESSIBLE, POINTS),
