@@ -58,6 +58,7 @@ const MEAN: Check = Check::Unit("mechanics::constitutive::discrete_gradient");
 const CONTACT_LAW: Check = Check::Unit("mechanics::contact");
 const SOLVER: Check = Check::Unit("solver::");
 const SOLIDS: Check = Check::Unit("shape::");
+const SPACE: Check = Check::Unit("space::");
 const PARTICLES: Check = Check::Unit("particles::");
 const STORED: Check = Check::Unit("checkpoint::");
 
@@ -199,7 +200,7 @@ pub(super) const FAULTS: &[ShippedFault] = &[
     fault("solver: a restart of GMRES forgets the solution so far", SOLVER, POINTS),
     fault("solver: the inverse of β in conjugate gradients", SOLVER, POINTS),
     fault("solver: negative curvature counts as positive", SOLVER, POINTS),
-    fault("solver: several threads leave out the first chunk of a dot product", SOLVER, POINTS),
+    fault("solver: several threads leave out the first chunk of a dot product", SPACE, POINTS),
     fault("solver: forcing by the ratio of residuals, not its square", SOLVER, POINTS),
     fault("solver: any fall of the residual is accepted", SOLVER, POINTS),
     fault("solver: every tangent has new diagonal blocks", SOLVER, POINTS),
