@@ -165,7 +165,40 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
         self.check_blocks(&self.tangent_at(None, at)?, bound)
     }
 
-    /// A piece of K u by dual numbers.
+    /// A piece of K u by dual numbers: the derivative of the same piece of the residual, through the same transfer loop.
+    ///
+    /// ```
+    /// use bfree::mechanics::check::direction;
+    /// use bfree::tensor::Vector;
+    ///
+    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+    /// let simulation = scene.build::<2>("scenes".as_ref())?;
+    /// let coming = simulation.next_step()?;
+    /// let (equilibrium, count) = (coming.equilibrium(), coming.nodes().len());
+    /// let phi: Vec<_> = direction::<2>(count, 1).iter().map(|x| x * 0.01).collect();
+    /// let u = direction::<2>(count, 2);
+    /// for piece in equilibrium.terms.pieces() {
+    ///     let (mut product, dual) = (vec![Vector::zeros(); count], equilibrium.derivative(piece, &phi, &u)?);
+    ///     equilibrium.tangent(piece, &phi)?.product(&u, &mut product);
+    ///     let apart = product.iter().zip(&dual).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+    ///     assert!(apart < 1e-12, "{}: {apart}", piece.name);
+    /// }
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// See [`Self::tangent`].
+    pub fn derivative(
+        &self,
+        piece: Piece,
+        phi: &[Vector<f64, D>],
+        u: &[Vector<f64, D>],
+    ) -> Result<Vec<Vector<f64, D>>, Inadmissible> {
+        let seeded: Vec<_> = phi.iter().zip(u).map(|(x, d)| x.zip_map(d, Dual64::new)).collect();
+        Ok(self.residual_of(piece, &seeded)?.iter().map(|r| r.map(|x| x.eps)).collect())
+    }
+
+    /// [`Self::derivative`] with the cells of the mixed form, and without entries at prescribed values.
     fn dual_rows(
         &self,
         piece: Piece,

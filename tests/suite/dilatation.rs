@@ -116,7 +116,8 @@ fn threads_and_restarts_change_no_bit() -> Result<(), Failure> {
     Ok(())
 }
 
-/// A total Lagrangian grid whose reference configuration has θ ≠ 1. The particles may be reordered in memory between two steps.
+/// A total Lagrangian grid whose reference configuration has θ ≠ 1. The particles may be reordered in memory between two steps; the
+/// next step puts them back.
 #[test]
 fn dilatations_of_a_kept_grid_go_with_their_particles() -> Result<(), Failure> {
     let mut simulation = membrane(0.49, 6.0, 8, &[MEAN, LINEAR, r#"grid.reset={"strain":0.05}"#])?;

@@ -7,28 +7,16 @@ use bfree::material::{ClosedTangent, Lame, Law, MaterialState, NeoHookean};
 use bfree::mechanics::check::{CheckError, TangentMismatch, direction, tangent_bound};
 use bfree::mechanics::loads::ForceField;
 use bfree::mechanics::loads::{Curve, Gravity, Loads, PrescribedDof, Pressing, SurfaceLoad, SurfacePoint};
-use bfree::mechanics::residual::{Equilibrium, Inadmissible};
+use bfree::mechanics::residual::Equilibrium;
 use bfree::mechanics::schemes::Newmark;
 use bfree::mechanics::sweep::Connectivity;
-use bfree::mechanics::terms::{Piece, Step};
+use bfree::mechanics::terms::Step;
 use bfree::mechanics::transfer::Nodal;
 use bfree::particles::{Body, Particles};
 use bfree::scalar::Real;
 use bfree::solver::NonlinearProblem;
 use bfree::tensor::{Tensor, Vector, outer, scaled};
-use num_dual::Dual64;
 use std::sync::Arc;
-
-/// A piece of K u by dual numbers: the derivative of the same piece of the residual, through the same transfer loop.
-fn derivative<const D: usize, L: Law>(
-    equilibrium: &Equilibrium<'_, D, L>,
-    piece: Piece,
-    phi: &[Vector<f64, D>],
-    u: &[Vector<f64, D>],
-) -> Result<Vec<Vector<f64, D>>, Inadmissible> {
-    let seeded: Vec<_> = phi.iter().zip(u).map(|(x, d)| x.zip_map(d, Dual64::new)).collect();
-    Ok(equilibrium.residual_of(piece, &seeded)?.iter().map(|r| r.map(|x| x.eps)).collect())
-}
 
 /// The function of a law that is wrong.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -189,7 +177,7 @@ fn wrong_pieces<const D: usize>(
 ) -> Result<Vec<&'static str>, Failure> {
     let mut wrong = Vec::new();
     for piece in equilibrium.terms.pieces() {
-        let (mut product, dual) = (vec![Vector::zeros(); u.len()], derivative(equilibrium, piece, dphi, u)?);
+        let (mut product, dual) = (vec![Vector::zeros(); u.len()], equilibrium.derivative(piece, dphi, u)?);
         equilibrium.tangent(piece, dphi)?.product(u, &mut product);
         let apart: Vec<_> = product.iter().zip(&dual).map(|(a, b)| a - b).collect();
         // In 1D a follower pressure has no derivative.
@@ -370,7 +358,7 @@ fn a_pressure_acts_on_flat_particles<const D: usize>() -> Result<(), Failure> {
     let piece = piece.ok_or("no pressure")?;
     let tangent = equilibrium.tangent(piece, &dphi)?;
     let checked = |u: &[Vector<f64, D>]| -> Result<_, Failure> {
-        let (mut product, dual) = (vec![Vector::zeros(); u.len()], derivative(&equilibrium, piece, &dphi, u)?);
+        let (mut product, dual) = (vec![Vector::zeros(); u.len()], equilibrium.derivative(piece, &dphi, u)?);
         tangent.product(u, &mut product);
         let apart: Vec<_> = product.iter().zip(&dual).map(|(a, b)| a - b).collect();
         assert!(norm(&apart) <= 1e-14 * norm(&dual), "{D}D: {} of {}", norm(&apart), norm(&dual));

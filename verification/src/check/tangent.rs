@@ -7,7 +7,6 @@ use bfree::approximation::ShapeFunction;
 use bfree::material::Law;
 use bfree::mechanics::residual::{Equilibrium, Inadmissible, compose};
 use bfree::mechanics::tangent::Tangent;
-use bfree::mechanics::terms::Piece;
 use bfree::simulation::Simulation;
 use bfree::tensor::{Tensor, Vector, identity};
 use num_dual::Dual64;
@@ -165,7 +164,7 @@ fn measure_pieces<const D: usize, L: Law>(
         let mut worst: f64 = 0.0;
         let mut products = Vec::new();
         for (u, largest) in directions.iter().zip(&mut largest) {
-            let mut dual = derivative(equilibrium, piece, dphi, u)?;
+            let mut dual = equilibrium.derivative(piece, dphi, u)?;
             equilibrium.clear_prescribed(&mut dual);
             let analytic = product(&frozen, u);
             worst = worse(worst, relative(&analytic, &dual, norm(&analytic)));
@@ -263,15 +262,4 @@ fn norm<const D: usize>(a: &[Vector<f64, D>]) -> f64 {
 
 fn dot<const D: usize>(a: &[Vector<f64, D>], b: &[Vector<f64, D>]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a.dot(b)).sum()
-}
-
-/// A piece of K u by dual numbers: the derivative of the same piece of the residual, through the same transfer loop.
-fn derivative<const D: usize, L: Law>(
-    equilibrium: &Equilibrium<'_, D, L>,
-    piece: Piece,
-    phi: &[Vector<f64, D>],
-    u: &[Vector<f64, D>],
-) -> Result<Vec<Vector<f64, D>>, Inadmissible> {
-    let seeded: Vec<_> = phi.iter().zip(u).map(|(x, d)| x.zip_map(d, Dual64::new)).collect();
-    Ok(equilibrium.residual_of(piece, &seeded)?.iter().map(|r| r.map(|x| x.eps)).collect())
 }
