@@ -1,6 +1,8 @@
 //! The particles: structure of arrays, and the bodies they belong to.
 
 use crate::material::{Law, MaterialState, VolumeResponse};
+use crate::parallel;
+use crate::pooled::{Element, Pool};
 use crate::scalar::Real;
 use crate::tensor::{Deformation, Tensor, Vector};
 use schemars::JsonSchema;
@@ -245,9 +247,9 @@ impl<const D: usize> Particles<D> {
     pub(crate) fn store_reference(&mut self) {
         if self.reference.is_none() {
             self.reference = Some(Configuration {
-                position: self.position.clone(),
-                displacement_gradient: self.displacement_gradient.clone(),
-                dilatation: self.dilatation.clone(),
+                position: parallel::copy_of(&self.position),
+                displacement_gradient: parallel::copy_of(&self.displacement_gradient),
+                dilatation: parallel::copy_of(&self.dilatation),
             });
         }
     }
@@ -316,8 +318,7 @@ impl<const D: usize> Particles<D> {
         sorted
     }
 
-    /// Moves the particle at `order[i]` to the place `i`; `order` must be a permutation. All arrays except the internal variables are
-    /// permuted in place.
+    /// Moves the particle at `order[i]` to the place `i`; `order` must be a permutation.
     ///
     /// ```
     /// use bfree::particles::Particles;
@@ -333,23 +334,27 @@ impl<const D: usize> Particles<D> {
     /// assert_eq!(particles.by_id().position.iter().map(|x| x[0]).collect::<Vec<_>>(), [0.0, 1.0, 2.0]);
     /// ```
     pub fn rearrange(&mut self, order: &[u32]) {
-        let mut moved = vec![false; self.len()];
+        self.rearrange_in(order, &Pool::default());
+    }
+
+    /// [`Self::rearrange`] with memory of a pool for one array at a time.
+    pub(crate) fn rearrange_in(&mut self, order: &[u32], pool: &Pool) {
         let Self {
             position, velocity, acceleration, displacement_gradient, volume, mass, body, id, dilatation, ..
         } = self;
-        [position, velocity, acceleration].into_iter().for_each(|vectors| permute(vectors, order, &mut moved));
-        permute(displacement_gradient, order, &mut moved);
-        [volume, mass, dilatation].into_iter().for_each(|numbers| permute(numbers, order, &mut moved));
-        [body, id].into_iter().for_each(|numbers| permute(numbers, order, &mut moved));
-        if self.variable_count > 0 {
-            let of = |&p: &u32| self.memory[p as usize * self.variable_count..][..self.variable_count].iter().copied();
-            self.memory = order.iter().flat_map(of).collect();
+        [position, velocity, acceleration].into_iter().for_each(|vectors| permute(vectors, 1, order, pool));
+        permute(displacement_gradient, 1, order, pool);
+        [volume, mass, dilatation].into_iter().for_each(|numbers| permute(numbers, 1, order, pool));
+        for numbers in [body, id] {
+            let before = parallel::copy_of(numbers);
+            parallel::each(numbers, |place, number| *number = before[order[place] as usize]);
         }
+        permute(&mut self.memory, self.variable_count, order, pool);
         if let Some(Configuration { position, displacement_gradient, dilatation }) = &mut self.reference {
-            permute(position, order, &mut moved);
-            permute(displacement_gradient, order, &mut moved);
+            permute(position, 1, order, pool);
+            permute(displacement_gradient, 1, order, pool);
             mutant!("mean dilatation: means of a kept grid stay where particles were": { return; });
-            permute(dilatation, order, &mut moved);
+            permute(dilatation, 1, order, pool);
         }
     }
 
@@ -394,18 +399,17 @@ impl<const D: usize> Particles<D> {
     }
 }
 
-/// Moves the entry at `order[i]` to the place `i`, cycle after cycle.
-fn permute<T: Copy>(array: &mut [T], order: &[u32], moved: &mut [bool]) {
-    moved.fill(false);
-    for start in 0..array.len() {
-        let (first, mut to) = (array[start], start);
-        while !moved[to] {
-            moved[to] = true;
-            let from = order[to] as usize;
-            array[to] = if from == start { first } else { array[from] };
-            to = from;
-        }
+/// Moves the row at `order[i]` to the place `i`, in an array of rows of `width` elements or in an empty one.
+fn permute<T: Element>(array: &mut [T], width: usize, order: &[u32], pool: &Pool) {
+    if array.is_empty() {
+        return;
     }
+    let mut moved = pool.unspecified(array.len());
+    parallel::rows(&mut moved, width, |place, row| {
+        let from = order[place] as usize * width;
+        row.copy_from_slice(&array[from..from + width]);
+    });
+    parallel::copy(&moved, array);
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 use super::pieces::Pieces;
 use crate::grid::indices;
+use crate::lists::Lists;
 use crate::parallel;
 use rustc_hash::FxHashMap;
 use std::collections::{BTreeMap, HashSet};
@@ -19,6 +20,9 @@ pub struct Occupied<'a> {
     /// The occupied knot cells, each with its filled fraction.
     pub cells: Vec<([u32; 3], f64)>,
 }
+
+/// Cells in one part of the work of a thread.
+const CELLS: usize = 256;
 
 /// Relative tolerance of comparisons between filled fractions: round-off must not choose a cell.
 const SAME: f64 = 1e-6;
@@ -39,6 +43,8 @@ pub(super) struct Bodies {
     /// For each cell, the nodes of its functions; `None` if one of these nodes is not active.
     pub(super) windows: Vec<Option<Vec<u32>>>,
     numbers: FxHashMap<[i64; 3], u32>,
+    /// For each cell, the occupied cells that share a corner with it, including the cell itself.
+    neighbours: Lists<u32>,
 }
 
 impl Bodies {
@@ -53,11 +59,13 @@ impl Bodies {
             dimension: occupied.dimension,
             piece: (0..cells.len()).collect(),
             windows: Vec::new(),
+            neighbours: Lists::default(),
             cells,
             places,
             numbers,
         };
-        bodies.windows = parallel::map(bodies.cells.len(), &|cell| bodies.window(bodies.cells[cell].0));
+        bodies.windows = parallel::values_by(CELLS, bodies.cells.len(), |cell| bodies.window(bodies.cells[cell].0));
+        bodies.neighbours = bodies.found_neighbours();
         bodies.connect();
         bodies
     }
@@ -68,10 +76,24 @@ impl Bodies {
         in_box([0, 1, 2].map(along)).map(|node| self.numbers.get(&node).copied()).collect()
     }
 
+    /// For each cell, the occupied cells that share a corner with it, including the cell itself.
+    fn found_neighbours(&self) -> Lists<u32> {
+        let beside =
+            |cell: usize| -> Vec<u32> { self.around(self.cells[cell].0, 1).map(|beside| beside as u32).collect() };
+        let mut neighbours = Lists::default();
+        parallel::values_by(CELLS, self.cells.len(), beside).into_iter().for_each(|row| neighbours.push(row));
+        neighbours
+    }
+
     /// The occupied cells at most `reach` cells away along every axis, including the cell itself.
     fn around(&self, cell: [i64; 3], reach: i64) -> impl Iterator<Item = usize> {
         let along = |k| if k < self.dimension { cell[k] - reach..=cell[k] + reach } else { 0..=0 };
         in_box([0, 1, 2].map(along)).filter_map(|at| self.places.get(&at).copied())
+    }
+
+    /// The occupied cells that share a corner with a cell, including the cell itself.
+    fn beside(&self, cell: usize) -> impl Iterator<Item = usize> + use<'_> {
+        self.neighbours.row(cell).iter().map(|&beside| beside as usize)
     }
 
     /// Finds the connected pieces: cells that share a corner belong to one piece.
@@ -82,9 +104,11 @@ impl Bodies {
             seen[start] = true;
             while let Some(cell) = stack.pop() {
                 self.piece[cell] = start;
-                let beside: Vec<usize> = self.around(self.cells[cell].0, 1).filter(|&next| !seen[next]).collect();
-                beside.iter().for_each(|&next| seen[next] = true);
-                stack.extend(beside);
+                for next in self.beside(cell) {
+                    if !std::mem::replace(&mut seen[next], true) {
+                        stack.push(next);
+                    }
+                }
             }
         }
     }
@@ -100,9 +124,9 @@ impl Bodies {
             cells().filter(|&cell| alone[cell] && share(cell) >= self.pieces.share * (1.0 - SAME)).collect();
         let mut new = good.clone();
         loop {
-            new.iter().for_each(|&cell| self.around(self.cells[cell].0, 1).for_each(|beside| alone[beside] = false));
+            new.iter().for_each(|&cell| self.beside(cell).for_each(|beside| alone[beside] = false));
             let fullest = |&cell: &usize| {
-                let mut beside = self.around(self.cells[cell].0, 1).filter(|&beside| alone[beside]);
+                let mut beside = self.beside(cell).filter(|&beside| alone[beside]);
                 beside.all(|beside| share(cell) >= share(beside) * (1.0 - SAME))
             };
             new = cells().filter(|&cell| alone[cell]).filter(fullest).collect();

@@ -208,7 +208,7 @@ fn reference<const D: usize>(arrays: &Arrays, particles: usize) -> Result<Option
 }
 
 /// A nodal state, and Δφ/Δt.
-type Nodes<const D: usize> = (Nodal<D>, Vec<Vector<f64, D>>);
+type Nodes<const D: usize> = (Nodal<D>, Pooled<Vector<f64, D>>);
 
 /// The state of the nodes of a grid that is not reset, if there is one, and Δφ/Δt. The number of nodes cannot be checked here, because only
 /// a step knows it.
@@ -226,7 +226,7 @@ fn grid<const D: usize>(arrays: &Arrays, has_inertia: bool) -> Result<Option<Nod
         out_of_balance: field(arrays, "grid_out_of_balance"),
         ..Nodal::default()
     };
-    let rate = values(arrays, "grid_rate");
+    let rate: Pooled<Vector<f64, D>> = field(arrays, "grid_rate");
     let nodes = nodal.motion.len();
     if nodes == 0 {
         return Ok(None);
@@ -350,7 +350,7 @@ fn restore_refined<const D: usize, L, A>(
     if let Some((nodal, rate)) = grid {
         (simulation.history.grid, simulation.history.rate) = (Some(nodal), rate);
     }
-    mutant!("checkpoint: a restart resets the grid": { (simulation.history.grid, simulation.particles.reference) = (None, None); simulation.history.rate.clear(); });
+    mutant!("checkpoint: a restart resets the grid": { (simulation.history.grid, simulation.particles.reference) = (None, None); simulation.history.rate = Pooled::default(); });
     let pairs = values::<[f64; 2]>(arrays, "bonded");
     mutant!("checkpoint: bonded bodies are forgotten": pairs = Vec::<[f64; 2]>::new());
     simulation.history.bonded = pairs.iter().map(|pair| pair.map(|body| body as u32)).collect();

@@ -11,6 +11,7 @@
 
 use crate::mechanics::mass::is_light;
 use crate::mechanics::sweep::Connectivity;
+use crate::parallel;
 use crate::particles::Particles;
 use crate::pooled::Pooled;
 use crate::tensor::{Tensor, Vector, identity, inverse, scaled};
@@ -34,7 +35,7 @@ pub(super) fn affine<const D: usize>(
     let mean = |value: &(dyn Fn(usize) -> Vector<f64, D> + Sync)| {
         let mut mean: Pooled<Vector<f64, D>> = connectivity.field();
         connectivity.spread(&mut mean, |p| value(p) * particles.mass[p]);
-        mean.iter_mut().zip(mass).for_each(|(mean, &m)| *mean = if is_light(m) { Vector::zeros() } else { *mean / m });
+        parallel::zip(&mut mean, mass, |mean, &m| *mean = if is_light(m) { Vector::zeros() } else { *mean / m });
         mean
     };
     let centre = mean(&x);
@@ -51,9 +52,9 @@ pub(super) fn affine<const D: usize>(
             covariance(&|p| field[p]).iter().zip(&inverses).map(|(with, inverse)| with * inverse).collect();
         let mut gradient = vec![Tensor::<f64, D>::zeros(); particles.len()];
         for k in 0..D {
-            let column = connectivity.pool().collect(slopes.iter().map(|slope| slope.column(k).into_owned()));
+            let column = connectivity.pool().made(slopes.len(), |node| slopes[node].column(k).into_owned());
             let columns = connectivity.values(&column);
-            gradient.iter_mut().zip(&*columns).for_each(|(gradient, column)| gradient.set_column(k, column));
+            parallel::zip(&mut gradient, &columns, |gradient, column| gradient.set_column(k, column));
         }
         // ⟨u − G x⟩ + ⟨G⟩ x_I
         let mut fitted = mean(&|p| field[p] - gradient[p] * x(p));

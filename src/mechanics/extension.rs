@@ -3,7 +3,7 @@
 use crate::aggregation::{Extension, Occupied, Pieces};
 use crate::grid::indices;
 use crate::mechanics::sweep::Connectivity;
-use crate::parallel::{self, PART};
+use crate::parallel;
 use crate::particles::Particles;
 use crate::tensor::identity;
 use rustc_hash::FxHashMap;
@@ -49,10 +49,9 @@ fn of_field<const D: usize>(
             *volume += reference.volume(p) * parts.iter().map(|(_, part)| part).product::<f64>();
         }
     };
-    let parts = parallel::map(particles.len().div_ceil(PART), &|part| {
+    let parts = parallel::collect(parallel::parts(particles.len()), &|part| {
         let (mut own, mut volumes) = (Vec::new(), FxHashMap::default());
-        let of_part = part * PART..particles.len().min((part + 1) * PART);
-        of_part.filter(|&p| particles.is_solid(p) && in_field(p)).for_each(|p| add(p, &mut own, &mut volumes));
+        part.filter(|&p| particles.is_solid(p) && in_field(p)).for_each(|p| add(p, &mut own, &mut volumes));
         (own, volumes)
     });
     let mut volumes: FxHashMap<[u32; D], f64> =

@@ -40,7 +40,8 @@ pub fn lumped<const D: usize>(particles: &Particles<D>, connectivity: &Connectiv
 
 /// Whether a nodal mass is too small for a projected velocity. Δφ of such a light node comes from the stiffness.
 pub(super) fn is_light<const D: usize>(particles: &Particles<D>) -> impl Fn(f64) -> bool + use<D> {
-    let light = LIGHT * particles.mass.iter().fold(0.0, |max: f64, &m| max.max(m));
+    let largest = |mass: &[f64]| mass.iter().fold(0.0, |max: f64, &m| max.max(m));
+    let light = LIGHT * largest(&parallel::collect(particles.mass.chunks(PART), &largest));
     mutant!("mass: nodes without mass have a velocity": light = 0.0);
     move |mass| mass < light
 }
@@ -66,11 +67,7 @@ impl<const D: usize> Mass<'_, D> {
     /// `out += factor ε m u` at the nodes
     pub(crate) fn add_lumped(&self, factor: f64, u: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
         let factor = factor * self.lumping;
-        parallel::for_each(out.chunks_mut(PART).enumerate(), &|(part, out): (usize, &mut [Vector<f64, D>])| {
-            for (node, out) in (part * PART..).zip(out) {
-                *out += u[node] * (factor * self.lumped[node]);
-            }
-        });
+        parallel::each(out, |node, out| *out += u[node] * (factor * self.lumped[node]));
     }
 
     /// `q += factor (1−ε) m u` at the particles of a group
@@ -102,10 +99,13 @@ impl<const D: usize> Mass<'_, D> {
         for field in &mut nodal {
             match &inverse_diagonal {
                 Some(inverse_diagonal) => iterations += self.solve(&space, inverse_diagonal, field)?,
-                None => field.iter_mut().zip(&*lumped).for_each(|(w, &m)| *w /= m),
+                None => parallel::zip(field, &lumped, |w, m| *w /= *m),
             }
-            let light = field.iter_mut().zip(&*lumped).filter(|(_, m)| is_light(**m));
-            light.for_each(|(w, _)| *w = Vector::zeros());
+            parallel::zip(field, &lumped, |w, m| {
+                if is_light(*m) {
+                    *w = Vector::zeros();
+                }
+            });
             space.followers().extend(field);
         }
         Ok((nodal, iterations))
@@ -113,7 +113,7 @@ impl<const D: usize> Mass<'_, D> {
 
     /// 1/M̃_II; zero at nodes without mass and at outer nodes.
     fn inverse_diagonal(&self, space: &Space<D>) -> Pooled<f64> {
-        let mut diagonal = self.connectivity.pool().collect(self.lumped.iter().map(|m| self.lumping * m));
+        let mut diagonal = self.connectivity.pool().made(self.lumped.len(), |node| self.lumping * self.lumped[node]);
         self.connectivity.spread_with(Weights::Square, bytemuck::cast_slice_mut(&mut diagonal), |p| {
             Vector::from([(1.0 - self.lumping) * self.particles.mass[p]])
         });
@@ -123,7 +123,7 @@ impl<const D: usize> Mass<'_, D> {
         }
         // The smallest positive numbers have no finite inverse.
         let inverse = |d: f64| if d > 0.0 && d.recip().is_finite() { d.recip() } else { 0.0 };
-        diagonal.iter_mut().for_each(|d| *d = inverse(*d));
+        parallel::each(&mut diagonal, |_, d| *d = inverse(*d));
         diagonal
     }
 
@@ -134,8 +134,7 @@ impl<const D: usize> Mass<'_, D> {
         inverse_diagonal: &[f64],
         field: &mut [Vector<f64, D>],
     ) -> Result<usize, LinearError> {
-        let right = self.connectivity.pool().collect(field.iter().copied());
-        field.fill(Vector::zeros());
+        let right = self.connectivity.pool().copy_of(field);
         let settings = ConjugateGradientSettings {
             relative_tolerance: PROJECTION_TOLERANCE,
             max_iterations: 10 * right.len() + 100,
@@ -144,17 +143,15 @@ impl<const D: usize> Mass<'_, D> {
         let vectors = self.connectivity.pool();
         // Eᵀ M̃ E
         let operator = |x: &[f64], y: &mut [f64]| {
-            let mut x: Pooled<Vector<f64, D>> = vectors.collect(bytemuck::cast_slice(x).iter().copied());
-            space.followers().extend(&mut x);
-            let y: &mut [Vector<f64, D>] = bytemuck::cast_slice_mut(y);
-            y.fill(Vector::zeros());
-            self.add_product(1.0, &x, y);
+            let (x, y): (&[Vector<f64, D>], &mut [Vector<f64, D>]) =
+                (bytemuck::cast_slice(x), bytemuck::cast_slice_mut(y));
+            let extended = space.extended_in_pool(x);
+            parallel::fill(y, Vector::zeros());
+            self.add_product(1.0, extended.as_deref().unwrap_or(x), y);
             space.followers().restrict(y);
         };
         let inverse = |r: &[f64], z: &mut [f64]| {
-            for (k, (z, r)) in z.iter_mut().zip(r).enumerate() {
-                *z = r * inverse_diagonal[k / D];
-            }
+            parallel::each(z, |k, z| *z = r[k] * inverse_diagonal[k / D]);
         };
         let system = System { vectors, operator: &operator, inverse: &inverse };
         Ok(settings.solve(&system, right, solution)?.iterations)

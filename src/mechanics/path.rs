@@ -84,7 +84,7 @@ impl<'a, const D: usize, L: Law> OnPath<'a, D, L> {
         dt: f64,
     ) -> Result<Self, Inadmissible> {
         let size = vector::norm(bytemuck::cast_slice(rate));
-        let before = start.step.connectivity.pool().collect(start.step.nodal.moved(rate.len()));
+        let before = start.step.nodal.motion_of(rate.len(), start.step.connectivity.pool());
         let direction = rate.iter().map(|rate| rate / size).collect();
         Ok(Self { path, start, force, at_start: force(path.load)?, before, direction, length: path.speed * dt })
     }

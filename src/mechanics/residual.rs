@@ -1,8 +1,7 @@
 //! The residual R(φ) of one step: the sum of its terms, coded once, generic over the number type (eqs. 17, 33, with the signs corrected).
 //!
 //! Everywhere in the terms, φ is the nodal motion since the last grid reset: φ = φ_n + Δφ, with the motion Δφ since t_n. With a reset in every
-//! step, as in the paper, φ_n = 0. φ̂ is the motion that ends without acceleration
-//! ([`Nodal::predicted`](crate::mechanics::transfer::Nodal::predicted)).
+//! step, as in the paper, φ_n = 0. φ̂ is the motion that ends without acceleration, φ_n + [Δφ̂](crate::mechanics::schemes::Alphas::predicted).
 
 use crate::material::Law;
 use crate::mechanics::constitutive::Part;
@@ -11,7 +10,7 @@ use crate::mechanics::sweep::{Mode, Number, Weights};
 use crate::mechanics::symmetry::Unsymmetric;
 use crate::mechanics::terms::{Piece, Role, Step, Terms};
 use crate::mechanics::trial::Trial;
-use crate::parallel::First;
+use crate::parallel::{self, First};
 use crate::pooled::Pooled;
 use crate::solver::Stop;
 use crate::space::{Space, vector};
@@ -131,7 +130,7 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
         let magnitude = weights == Weights::Magnitude;
         let phi = &*self.space.extended(at.phi);
         if !magnitude {
-            out.fill(Vector::zeros());
+            parallel::fill(out, Vector::zeros());
             self.terms.add_at_nodes(&picked, phi, out);
         }
         let mut points = self.terms.at_points::<T>(&picked, part, Trial { phi, ..at });
@@ -164,7 +163,7 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
     /// See [`Self::residual`].
     pub fn external_force(&self, phi: &[Vector<f64, D>]) -> Result<Pooled<Vector<f64, D>>, Inadmissible> {
         let mut force = self.forces(Role::Loads, phi)?;
-        force.iter_mut().for_each(|force| *force = -*force);
+        parallel::each(&mut force, |_, force| *force = -*force);
         Ok(force)
     }
 
@@ -177,7 +176,7 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
 
     /// The sum of the terms of one role.
     pub(crate) fn forces(&self, role: Role, phi: &[Vector<f64, D>]) -> Result<Pooled<Vector<f64, D>>, Inadmissible> {
-        let mut force = self.step.connectivity.field();
+        let mut force = self.step.connectivity.pool().unspecified(phi.len());
         self.sum_into(|_, of| of == role, Part::Whole, Weights::Signed, Trial::motion(phi), &mut force)?;
         Ok(force)
     }

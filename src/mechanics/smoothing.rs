@@ -10,6 +10,7 @@
 //! (1981) do so in gas dynamics, with differences of second and fourth order.
 
 use crate::mechanics::sweep::Connectivity;
+use crate::parallel;
 use crate::particles::Particles;
 use crate::pooled::Pooled;
 use crate::tensor::Vector;
@@ -118,19 +119,21 @@ impl Smoothing {
         }
         // In the frame of the centre of mass, the variance ⟨v²⟩ − v̄² loses the fewest digits.
         let frame = particles.momentum() / particles.mass.iter().sum::<f64>();
-        let velocity = connectivity.pool().collect(particles.velocity.iter().map(|v| v - frame));
+        let (pool, count) = (connectivity.pool(), particles.len());
+        let velocity = pool.made(count, |p| particles.velocity[p] - frame);
         let mean = nodal_mean(particles, connectivity, mass, &velocity);
-        let squares = connectivity.pool().collect(velocity.iter().map(|v| Vector::from([v.norm_squared()])));
+        let squares = pool.made(count, |p| Vector::from([velocity[p].norm_squared()]));
         let mean_square = nodal_mean(particles, connectivity, mass, &squares);
         let mean_of_mean = nodal_mean(particles, connectivity, mass, &connectivity.values(&mean));
-        let share = |((v, v_twice), square): ((&Vector<f64, D>, &Vector<f64, D>), &Vector<f64, 1>)| {
+        let share = |node: usize| {
+            let (v, v_twice, square) = (mean[node], mean_of_mean[node], mean_square[node]);
             let variance = (square[0] - v.norm_squared()).max(0.0) + ROUND_OFF * square[0];
             let q = if variance > 0.0 { (v - v_twice).norm_squared() / variance } else { 0.0 };
             let kink = (q / KINK).powi(SHARPNESS).min(1.0);
             // The share is zero without a kink, also for an infinite rate.
             if kink > 0.0 { -(-self.at_kinks * kink * dt).exp_m1() } else { 0.0 }
         };
-        Some(connectivity.pool().collect(mean.iter().zip(&mean_of_mean).zip(&mean_square).map(share)))
+        Some(pool.made(mean.len(), share))
     }
 
     /// −θ (u_p − Σ N w) − Σ N_I θ_I (u_p − ū_I) for a particle field u. `mass` is M_L at the active nodes, `at_kinks` is from
@@ -148,21 +151,21 @@ impl Smoothing {
     ) -> Pooled<Vector<f64, D>> {
         let theta = self.share(dt);
         // r_j = (I − N M_L⁻¹ Nᵀm)^j u at the particles, and Σ N w = u − r_k.
-        let mut change = connectivity.pool().collect(field.iter().copied());
+        let mut change = connectivity.pool().copy_of(field);
         for _ in 0..self.order {
             let smooth = nodal_mean(particles, connectivity, mass, &change);
-            change.iter_mut().zip(&*connectivity.values(&smooth)).for_each(|(change, smooth)| *change -= smooth);
+            parallel::zip(&mut change, &connectivity.values(&smooth), |change, smooth| *change -= smooth);
         }
-        change.iter_mut().for_each(|r| *r *= -theta);
+        parallel::each(&mut change, |_, r| *r *= -theta);
         if let Some(shares) = at_kinks {
             let mut drawn = nodal_mean(particles, connectivity, mass, field);
-            drawn.iter_mut().zip(shares).for_each(|(u, &share)| *u *= share);
+            parallel::zip(&mut drawn, shares, |u, share| *u *= *share);
             let shares = connectivity.values::<1>(bytemuck::cast_slice(shares));
             let drawn = connectivity.values(&drawn);
-            for (((change, u), share), drawn) in change.iter_mut().zip(field).zip(&*shares).zip(&*drawn) {
-                *change -= u * share[0];
-                *change += drawn;
-            }
+            parallel::each(&mut change, |p, change| {
+                *change -= field[p] * shares[p][0];
+                *change += drawn[p];
+            });
         }
         change
     }
@@ -177,9 +180,7 @@ fn nodal_mean<const C: usize, const D: usize>(
 ) -> Pooled<Vector<f64, C>> {
     let mut out: Pooled<Vector<f64, C>> = connectivity.field();
     connectivity.spread(&mut out, |p| field[p] * particles.mass[p]);
-    for (w, &m) in out.iter_mut().zip(mass) {
-        // A node without mass has no weight in later sums either.
-        *w = if m > 0.0 { *w / m } else { Vector::zeros() };
-    }
+    // A node without mass has no weight in later sums either.
+    parallel::zip(&mut out, mass, |w, &m| *w = if m > 0.0 { *w / m } else { Vector::zeros() });
     out
 }

@@ -9,7 +9,7 @@ use crate::mechanics::residual::{Equilibrium, Inadmissible};
 use crate::mechanics::sweep::{Connectivity, Group, Quadratic};
 use crate::mechanics::terms::Piece;
 use crate::mechanics::trial::Trial;
-use crate::parallel::{self, PART};
+use crate::parallel;
 use crate::particles::{Body, Particles};
 use crate::pooled::Pooled;
 use crate::solver::{LinearOperator, Linearization, LocalForm, OnDevice};
@@ -66,7 +66,7 @@ impl<'a, const D: usize> Tangent<'a, D> {
 
     /// K u, with given changes of the pressures of averaged cells in place of those that u causes.
     pub(super) fn product_under(&self, u: &[Vector<f64, D>], pressures: Option<&[f64]>, out: &mut [Vector<f64, D>]) {
-        parallel::for_each(out.chunks_mut(PART), &|out: &mut [Vector<f64, D>]| out.fill(Vector::zeros()));
+        parallel::fill(out, Vector::zeros());
         let extended = self.space.extended_in_pool(u);
         self.data.add_product(&self.mass, extended.as_deref().unwrap_or(u), pressures, out);
         mutant!("unknowns: forces stay at nodes that follow": { return self.space.clear_prescribed(out); });

@@ -2,11 +2,15 @@
 //!
 //! Format: "HDF5 File Format Specification Version 3.0" of The HDF Group. The file has a superblock of version 1, object headers of version 1,
 //! compact links, and chunks in B-trees of version 1, which all releases of the HDF5 library since 1.8 read. Chunks are shuffled and deflated,
-//! and written as soon as they are known, so the writer holds none. The same content gives the same bytes.
+//! and written as soon as they are known, so the writer holds few. The same content gives the same bytes.
 
 use super::vtu::compressed;
+use crate::parallel;
 use flate2::Compression;
 use std::io::{Error, Result, Seek, SeekFrom, Write};
+
+/// Chunks that are compressed at the same time.
+const AT_ONCE: usize = 64;
 
 /// The address that stands for a missing object.
 const NOWHERE: u64 = u64::MAX;
@@ -128,11 +132,16 @@ impl<W: Write + Seek> Writer<W> {
         small::<u32>(array.rows * size)?;
         let mut held = std::mem::take(&mut array.held);
         held.resize(held.len().next_multiple_of(array.rows * array.width()), 0);
-        for block in held.chunks(array.rows * array.width()) {
-            for column in 0..array.columns {
-                let plane = |byte: usize| block.iter().skip(column * size + byte).step_by(array.width()).copied();
-                let shuffled: Vec<u8> = (0..size).flat_map(plane).collect();
-                let packed = compressed(&shuffled, Compression::default());
+        let (columns, width) = (array.columns, array.width());
+        let chunks = held.chunks(array.rows * width).flat_map(|block| (0..columns).map(move |k| (block, k)));
+        let chunks: Vec<(&[u8], usize)> = chunks.collect();
+        let packed = |&(block, column): &(&[u8], usize)| {
+            let plane = |byte: usize| block.iter().skip(column * size + byte).step_by(width).copied();
+            let shuffled: Vec<u8> = (0..size).flat_map(plane).collect();
+            compressed(&shuffled, Compression::default())
+        };
+        for some in chunks.chunks(AT_ONCE) {
+            for packed in parallel::collect(some.iter(), &packed) {
                 array.chunks.push((self.put(&packed)?, small(packed.len())?));
             }
         }

@@ -6,6 +6,7 @@
 use super::OutputError;
 use super::files::write_atomically;
 use crate::field::column;
+use crate::parallel;
 use flate2::Compression;
 use flate2::read::{ZlibDecoder, ZlibEncoder};
 use std::io::{Read, Write};
@@ -115,7 +116,7 @@ impl Parts {
             self.xml += &format!(r#" ComponentName{k}="{component}""#);
         }
         self.xml += &format!(" format=\"appended\" offset=\"{}\"/>\n", self.data.len());
-        let blocks: Vec<Vec<u8>> = bytes.chunks(BLOCK).map(|block| compressed(block, Compression::fast())).collect();
+        let blocks = parallel::collect(bytes.chunks(BLOCK), &|block| compressed(block, Compression::fast()));
         let header = [blocks.len(), BLOCK, bytes.len() % BLOCK].into_iter().chain(blocks.iter().map(Vec::len));
         self.data.extend(header.flat_map(|word| (word as u64).to_le_bytes()));
         self.data.extend(blocks.iter().flatten());

@@ -11,8 +11,10 @@ mod processes;
 pub use mpi::MpiError;
 pub use processes::{Exchange, Message, Processes};
 
+use bytemuck::Pod;
 use rayon::prelude::*;
 use std::cell::RefCell;
+use std::ops::Range;
 use std::panic::Location;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
@@ -167,15 +169,96 @@ pub(crate) fn collect<P: Send, R: Send>(parts: impl Iterator<Item = P>, f: &(dyn
 /// Particles or nodes in one task of a pass over arrays.
 pub(crate) const PART: usize = 2048;
 
-/// `f(x, y)` for all pairs of elements.
+/// The parts of `0..count`.
+pub(crate) fn parts(count: usize) -> impl Iterator<Item = Range<usize>> {
+    parts_of(PART, count)
+}
+
+fn parts_of(size: usize, count: usize) -> impl Iterator<Item = Range<usize>> {
+    (0..count).step_by(size).map(move |first| first..count.min(first + size))
+}
+
+/// Below this number of elements, waking the threads costs more than short work at each of them.
+pub(crate) const FEW: usize = 8 * PART;
+
+/// `f(i, x_i)` for all elements, with short work at each.
 #[track_caller]
-pub(crate) fn zip<X: Send, Y: Sync>(x: &mut [X], y: &[Y], f: impl Fn(&mut X, &Y) + Sync) {
-    for_each(x.chunks_mut(PART).zip(y.chunks(PART)), &|(x, y): (&mut [X], &[Y])| {
-        x.iter_mut().zip(y).for_each(|(x, y)| f(x, y));
+pub(crate) fn each<X: Send>(x: &mut [X], f: impl Fn(usize, &mut X) + Sync) {
+    if x.len() < FEW { x.iter_mut().enumerate().for_each(|(i, x)| f(i, x)) } else { each_by(PART, x, f) }
+}
+
+/// `f(i, x_i)` for all elements, with `size` of them in a task.
+#[track_caller]
+pub(crate) fn each_by<X: Send>(size: usize, x: &mut [X], f: impl Fn(usize, &mut X) + Sync) {
+    for_each(x.chunks_mut(size).enumerate(), &|(part, x): (usize, &mut [X])| {
+        (part * size..).zip(x).for_each(|(i, x)| f(i, x));
     });
 }
 
-/// Sorts by the keys, all of which differ.
+/// `f(x, y)` for all pairs of elements, with short work at each.
+#[track_caller]
+pub(crate) fn zip<X: Send, Y: Sync>(x: &mut [X], y: &[Y], f: impl Fn(&mut X, &Y) + Sync) {
+    let part = |(x, y): (&mut [X], &[Y])| x.iter_mut().zip(y).for_each(|(x, y)| f(x, y));
+    if x.len() < FEW { part((x, y)) } else { for_each(x.chunks_mut(PART).zip(y.chunks(PART)), &part) }
+}
+
+/// Copies `from` to `to`.
+#[track_caller]
+pub(crate) fn copy<X: Copy + Send + Sync>(from: &[X], to: &mut [X]) {
+    zip(to, from, |to, from| *to = *from);
+}
+
+/// A copy in memory of its own.
+#[track_caller]
+pub(crate) fn copy_of<X: Pod + Send + Sync>(from: &[X]) -> Vec<X> {
+    let mut to = bytemuck::zeroed_vec(from.len());
+    copy(from, &mut to);
+    to
+}
+
+/// Sets all elements to `value`.
+#[track_caller]
+pub(crate) fn fill<X: Copy + Send + Sync>(x: &mut [X], value: X) {
+    each(x, |_, x| *x = value);
+}
+
+/// `f(i, row i)` for all rows of `width` elements.
+#[track_caller]
+pub(crate) fn rows<X: Send>(x: &mut [X], width: usize, f: impl Fn(usize, &mut [X]) + Sync) {
+    let count = (PART / width).max(1);
+    for_each(x.chunks_mut(count * width).enumerate(), &|(part, rows): (usize, &mut [X])| {
+        (part * count..).zip(rows.chunks_mut(width)).for_each(|(i, row)| f(i, row));
+    });
+}
+
+/// What `f(0, list)`, …, `f(count − 1, list)` append to a list, in this order, with `size` calls in a task.
+#[track_caller]
+pub(crate) fn list_by<R: Send>(size: usize, count: usize, f: impl Fn(usize, &mut Vec<R>) + Sync) -> Vec<R> {
+    let of_part = |part: Range<usize>| {
+        let mut list = Vec::new();
+        part.for_each(|i| f(i, &mut list));
+        list
+    };
+    let mut parts = collect(parts_of(size, count), &of_part).into_iter();
+    let mut all = parts.next().unwrap_or_default();
+    parts.for_each(|part| all.extend(part));
+    all
+}
+
+/// `f(0)`, …, `f(count − 1)`, with `size` of them in a task.
+#[track_caller]
+pub(crate) fn values_by<R: Send>(size: usize, count: usize, f: impl Fn(usize) -> R + Sync) -> Vec<R> {
+    list_by(size, count, |i, list| list.push(f(i)))
+}
+
+/// `f(0) + f(1) + …`, added in this order.
+#[track_caller]
+pub(crate) fn sum(count: usize, f: impl Fn(usize) -> f64 + Sync) -> f64 {
+    let of_part = |part: Range<usize>| -> Vec<f64> { part.map(&f).collect() };
+    if count < FEW { (0..count).map(f).sum() } else { collect(parts(count), &of_part).iter().flatten().sum() }
+}
+
+/// Sorts. Elements that are equal must be the same.
 pub(crate) fn sort<K: Ord + Send>(keys: &mut [K]) {
     keys.par_sort_unstable();
 }
@@ -243,6 +326,28 @@ mod tests {
                     part.iter_mut().zip(scratch).for_each(|(number, &mut i)| *number += i);
                 });
                 assert!(numbers.iter().enumerate().all(|(i, &number)| i == number));
+            });
+        }
+    }
+
+    #[test]
+    fn long_lists_are_cut_into_parts_and_keep_their_order() {
+        for (threads, count) in [(1, 20_000), (3, 20_000), (3, 2 * PART), (3, FEW), (3, 1), (3, 0)] {
+            with_threads(threads, || {
+                assert_eq!(parts(count).flatten().collect::<Vec<_>>(), (0..count).collect::<Vec<_>>());
+                assert_eq!(values_by(7, count, |i| 3 * i), (0..count).map(|i| 3 * i).collect::<Vec<_>>());
+                let thirds = list_by(11, count, |i, list: &mut Vec<usize>| list.extend((i % 3 == 0).then_some(i)));
+                assert_eq!(thirds, (0..count).step_by(3).collect::<Vec<_>>());
+                let mut copied = vec![0; count];
+                copy(&thirds, &mut copied);
+                assert!(copied.iter().zip(&thirds).all(|(a, b)| a == b) && copy_of(&thirds) == thirds);
+                let mut numbers = vec![1; count];
+                each(&mut numbers, |i, x| *x += i);
+                rows(&mut numbers, 7, |row, numbers| numbers.iter_mut().for_each(|x| *x += 10 * row));
+                assert!(numbers.iter().enumerate().all(|(i, &x)| x == 1 + i + 10 * (i / 7)));
+                // Harmonic numbers, added from the first term: another order has other bits.
+                let term = |i: usize| 1.0 / (i + 1) as f64;
+                assert_eq!(sum(count, term).to_bits(), (0..count).map(term).sum::<f64>().to_bits());
             });
         }
     }

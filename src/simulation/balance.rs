@@ -10,6 +10,7 @@ use crate::mechanics::rigid::loose;
 use crate::mechanics::sweep::Connectivity;
 use crate::mechanics::transfer::Nodal;
 use crate::mechanics::trial::Trial;
+use crate::parallel;
 use crate::particles::Body;
 use crate::pooled::Pooled;
 use crate::solver::{NewtonError, NewtonFailure, NewtonReport, Saddle, newton};
@@ -62,7 +63,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         for dof in prescribed {
             phi[dof.node][dof.component] = theta * dof.step.increment;
         }
-        phi.iter_mut().zip(&nodal.motion).for_each(|(phi, before)| *phi += before);
+        parallel::zip(&mut phi, &nodal.motion, |phi, before| *phi += before);
         self.meet_what_holds(&equilibrium, prescribed, &mut phi)?;
         let mut preconditioner = self.preconditioner().0.build::<D>();
         let (mut cosine, mut dilatation) = (None, [Vec::new(), Vec::new()]);
@@ -85,11 +86,14 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
                 preconditioner = Box::new(Saddle::<D>::over(preconditioner));
             }
             let nodal: &[f64] = bytemuck::cast_slice(&phi);
-            let mut x = connectivity.pool().collect(nodal.iter().chain(&dilatation[0]).copied());
+            let mut x = connectivity.pool().unspecified(nodal.len() + dilatation[0].len());
+            let (of_nodes, of_cells) = x.split_at_mut(nodal.len());
+            parallel::copy(nodal, of_nodes);
+            of_cells.copy_from_slice(&dilatation[0]);
             let report = newton(&equilibrium, &mut *preconditioner, &mut x, settings, connectivity.pool())
                 .map_err(|error| self.explained(error, &equilibrium, connectivity))?;
             let at = equilibrium.trial(&x);
-            phi.copy_from_slice(at.phi);
+            parallel::copy(at.phi, &mut phi);
             dilatation[1] = at.dilatation.to_vec();
             report
         };

@@ -7,13 +7,17 @@ use crate::material::Law;
 use crate::mechanics::contact::{
     Carrier, ContactPoint, FreeMotion, Surroundings, Touching, candidates, obstacle_points,
 };
-use crate::mechanics::loads::{Candidate, Contacts, Obstacle, PointInContact, Pose, RigidBody};
+use crate::mechanics::loads::{Contacts, Obstacle, PointInContact, Pose, RigidBody};
 use crate::mechanics::schemes::Alphas;
 use crate::mechanics::sweep::Connectivity;
 use crate::mechanics::terms::{ContactForce, Step, penalties};
+use crate::parallel;
 use crate::tensor::Vector;
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
+
+/// Points in one part of the work of a thread.
+const POINTS: usize = 128;
 
 /// The changes at all contacts in a step.
 #[derive(Debug, Default)]
@@ -147,18 +151,19 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// The position of each candidate relative to the other body, at both ends of the step.
     pub(super) fn relative_motions(&self, step: &Step<'_, D, L>, phi: &[Vector<f64, D>]) -> Vec<[Vector<f64, D>; 2]> {
         let (contacts, reference) = (&self.loads.contacts, self.particles.reference().position);
-        let candidates = contacts.between.iter().flat_map(|between| &between.candidates);
-        let of = |one: &Candidate<D>| {
+        let candidates = contacts.between.as_ref().map_or(&[][..], |between| &between.candidates);
+        let of = |number: usize| {
+            let one = &candidates[number];
             let position = |carrier: &Carrier<D>| carrier.position(reference, step.connectivity, phi) * carrier.share;
             [one.start, one.carriers(contacts).iter().map(position).sum()]
         };
-        candidates.map(of).collect()
+        parallel::values_by(POINTS, candidates.len(), of)
     }
 
     /// The positions of all particles at the end of the step.
     pub(super) fn end_positions(&self, step: &Step<'_, D, L>, phi: &[Vector<f64, D>]) -> Vec<Vector<f64, D>> {
-        let mut positions = self.particles.reference().position.to_vec();
-        positions.iter_mut().zip(&*step.connectivity.values(phi)).for_each(|(x, u)| *x += u);
+        let mut positions = parallel::copy_of(self.particles.reference().position);
+        parallel::zip(&mut positions, &step.connectivity.values(phi), |x, u| *x += u);
         positions
     }
 

@@ -8,6 +8,7 @@ use crate::mechanics::residual::Equilibrium;
 use crate::mechanics::sweep::Connectivity;
 use crate::mechanics::terms::Step;
 use crate::mechanics::transfer::Nodal;
+use crate::parallel;
 use crate::pooled::Pooled;
 use crate::tensor::Vector;
 
@@ -59,7 +60,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             InitialGuess::Velocity => &nodal.velocity,
             InitialGuess::LastStep => &self.history.rate,
         };
-        dphi.iter_mut().zip(rate).for_each(|(dphi, rate)| *dphi = rate * dt);
+        parallel::zip(&mut dphi, rate, |dphi, rate| *dphi = rate * dt);
         dphi
     }
 

@@ -21,7 +21,7 @@ pub struct History<const D: usize> {
     /// The nodal state; `None` if the next step resets the grid.
     pub(crate) grid: Option<Nodal<D>>,
     /// Δφ/Δt of the last step; empty if the next step resets the grid.
-    pub(crate) rate: Vec<Vector<f64, D>>,
+    pub(crate) rate: Pooled<Vector<f64, D>>,
     /// The prescribed conditions that held bodies in the first step, without those that a body has reached since. All other conditions are
     /// contacts.
     pub(crate) constrained: BTreeSet<usize>,
@@ -89,7 +89,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let mut grid = None;
         if self.settings.grid_reset != GridReset::EveryStep {
             self.particles.store_reference();
-            self.history.rate = update.rate(dt);
+            self.history.rate = update.rate(dt, connectivity.pool());
             grid = Some(update.end(projected, connectivity.pool()));
         }
         let Committed { strain, yielding } = update.commit(&mut self.particles, &self.bodies, connectivity, dt);
@@ -101,7 +101,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         self.history.grid = grid.filter(|_| !contact && self.settings.grid_reset.keeps(strain));
         self.history.equilibrium = None;
         if self.history.resets_grid() {
-            self.history.rate.clear();
+            self.history.rate = Pooled::default();
             self.particles.reference = None;
             if !self.settings.scheme.has_inertia() {
                 let touching = self.bodies_touch(connectivity);

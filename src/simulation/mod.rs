@@ -35,7 +35,7 @@ use crate::mechanics::schemes::Alphas;
 use crate::mechanics::sweep::{Connectivity, Fields, Points};
 use crate::mechanics::symmetry::Unsymmetric;
 use crate::mechanics::transfer::Nodal;
-use crate::parallel::{self, PART};
+use crate::parallel;
 use crate::particles::{Body, Particles};
 use crate::pooled::Pool;
 use crate::solver::Krylov;
@@ -170,7 +170,7 @@ impl<const D: usize, L, A> Simulation<D, L, A> {
     /// ```
     pub fn rearrange(&mut self, order: &[u32]) {
         self.workspace.connectivity = None;
-        self.particles.rearrange(order);
+        self.particles.rearrange_in(order, &self.workspace.pool);
         let last = self.history.equilibrium.iter_mut().map(|last| &mut last.loads);
         let loads = std::iter::once(&mut self.loads).chain(last);
         let mut points = loads.flat_map(Loads::points_mut).peekable();
@@ -193,12 +193,12 @@ impl<const D: usize, L: Law, A> Simulation<D, L, A> {
         if !self.has_internal_variable(DISSIPATED) {
             return 0.0;
         }
-        let particles = &self.particles;
+        let (particles, bodies) = (&self.particles, &self.bodies);
         let lost = |p: usize| {
-            let law = &self.bodies[particles.body[p] as usize].law;
+            let law = &bodies[particles.body[p] as usize].law;
             particles.volume[p] * internal_variable(law, &particles.state(p, 0.0), DISSIPATED).unwrap_or(0.0)
         };
-        (0..particles.len()).map(lost).sum()
+        parallel::sum(particles.len(), lost)
     }
 
     /// The Cauchy stress σ = P Fᵀ / J with P = F S (eq. 7), in the plane or along the line of the scene, of the particle at `place`.
@@ -315,10 +315,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             let [more, _] = body.averaged(particles.dilatation(p), at.j);
             particles.volume[p] * (body.law.energy(&at) + more)
         };
-        let parts = parallel::map(particles.len().div_ceil(PART), &|part| {
-            (part * PART..particles.len().min((part + 1) * PART)).map(energy).collect::<Vec<f64>>()
-        });
-        parts.iter().flatten().sum()
+        parallel::sum(particles.len(), energy)
     }
 
     /// Gives `velocity(x_I)` to the nodes and interpolates it once to the particles, v_p = Σ N v_I (section 4.1).

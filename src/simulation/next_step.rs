@@ -109,7 +109,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> NextStep<D, L, A> {
 
     /// The nodal motion φ since the last grid reset, for an increment Δφ since t_n.
     pub fn motion(&self, dphi: &[Vector<f64, D>]) -> Vec<Vector<f64, D>> {
-        dphi.iter().zip(self.nodal.moved(dphi.len())).map(|(dphi, before)| dphi + before).collect()
+        dphi.iter().enumerate().map(|(node, dphi)| dphi + self.nodal.moved(node)).collect()
     }
 
     /// The equilibrium, as a function of φ, at the instant of force balance: the end of the step, except in generalised-α.

@@ -9,6 +9,7 @@ use crate::mechanics::loads::PrescribedDof;
 use crate::mechanics::sweep::Connectivity;
 use crate::mechanics::transfer::{Nodal, Update};
 use crate::mechanics::trial::Trial;
+use crate::parallel;
 use crate::phases::Phase;
 use crate::solver::NewtonReport;
 
@@ -60,7 +61,7 @@ impl<const D: usize, L: Law + 'static, A: ShapeFunction + 'static> Simulation<D,
         self.check_tangent(&equilibrium, Trial { phi: &phi, dilatation: &after })?;
         // Forces are in balance at t_n + θ Δt. The motion is extrapolated to t_{n+1}.
         let (mut dphi, theta) = (phi, scheme.instant());
-        dphi.iter_mut().zip(nodal.moved(nodes.len())).for_each(|(dphi, before)| *dphi = (*dphi - before) / theta);
+        parallel::each(&mut dphi, |node, dphi| *dphi = (*dphi - nodal.moved(node)) / theta);
         // Dilatations that are extrapolated, too, would drift from the motion.
         let after = if theta < 1.0 { Vec::new() } else { after };
         mutant!("step: Δφ is the motion to the balance, not to the end": { dphi.iter_mut().for_each(|dphi| *dphi *= theta); });

@@ -9,6 +9,7 @@ use crate::mechanics::schemes::Alphas;
 use crate::mechanics::terms::{self, Role};
 use crate::mechanics::transfer::Update;
 use crate::mechanics::trial::Trial;
+use crate::parallel;
 use crate::pooled::Pooled;
 use crate::tensor::Vector;
 
@@ -39,7 +40,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     ) -> Result<Accounts<D>, StepError> {
         let (terms::Step { connectivity, nodal, .. }, phi) = (balanced.step, update.motion());
         let (t, dt) = (self.load(), self.clock.step());
-        let before = connectivity.pool().collect(nodal.moved(connectivity.nodes()));
+        let before = nodal.motion_of(connectivity.nodes(), connectivity.pool());
         let free = self.free_after(&balanced.step, &before, phi)?;
         let poses = self.poses_after(&free, t + dt);
         let mut end = balanced;
@@ -58,7 +59,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let start = self.equilibrium(connectivity, nodal, end.prescribed, Alphas::START, t);
         let middle = if is_mean { halfway(&before, phi) } else { Vec::new() };
         if end.prescribed.iter().any(|dof| dof.moving) {
-            let mut residual: Pooled<Vector<f64, D>> = connectivity.field();
+            let mut residual: Pooled<Vector<f64, D>> = connectivity.pool().unspecified(phi.len());
             let share = if is_mean { 1.0 } else { 0.5 };
             match is_mean {
                 true => balanced.residual_into(Trial::motion(&middle), &mut residual)?,
@@ -93,7 +94,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let mut reactions = vec![Reaction::NONE; conditions.len() * fields];
         let mut work = 0.0;
         if !end.prescribed.is_empty() {
-            let mut residual: Pooled<Vector<f64, D>> = connectivity.field();
+            let mut residual: Pooled<Vector<f64, D>> = connectivity.pool().unspecified(phi.len());
             end.residual_into(update.state(), &mut residual)?;
             for (dof, impulse) in end.prescribed.iter().zip(update.impulses()) {
                 let (reaction, blow) = (residual[dof.node][dof.component], impulse / dt);
@@ -113,10 +114,10 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
 
 /// The work of a force along Δφ.
 fn along<const D: usize>(force: &[Vector<f64, D>], dphi: &[Vector<f64, D>]) -> f64 {
-    force.iter().zip(dphi).map(|(force, dphi)| force.dot(dphi)).sum()
+    parallel::sum(dphi.len(), |node| force[node].dot(&dphi[node]))
 }
 
 /// The work of a force along Δφ, with the mean of its values at both ends of the step.
 fn mean_work<const D: usize>(end: &[Vector<f64, D>], start: &[Vector<f64, D>], dphi: &[Vector<f64, D>]) -> f64 {
-    end.iter().zip(start).zip(dphi).map(|((end, start), dphi)| 0.5 * (end + start).dot(dphi)).sum()
+    parallel::sum(dphi.len(), |node| 0.5 * (end[node] + start[node]).dot(&dphi[node]))
 }

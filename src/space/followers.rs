@@ -73,7 +73,7 @@ impl<const D: usize> Followers<D> {
             let leaders = self.extension.leaders(place);
             leaders.fold(Vector::<T, D>::zeros(), |sum, (leader, weight)| sum + field[leader] * T::lit(weight))
         };
-        let sums = in_parts(self.extension.len(), &sum);
+        let sums = parallel::values_by(PART, self.extension.len(), sum);
         for ((&outer, follows), sum) in self.extension.outer().iter().zip(&self.follows).zip(sums) {
             (0..D).filter(|&i| follows[i]).for_each(|i| field[outer as usize][i] = sum[i]);
         }
@@ -102,16 +102,10 @@ impl<const D: usize> Followers<D> {
             let force = forces[inner[at] as usize];
             followers.fold(force, |sum, (place, weight)| sum + moved[place] * T::lit(of(weight)))
         };
-        let sums = in_parts(inner.len(), &sum);
+        let sums = parallel::values_by(PART, inner.len(), sum);
         inner.iter().zip(sums).for_each(|(&leader, sum)| forces[leader as usize] = sum);
     }
 }
 
 /// Number of rows in one part of the work of a thread.
 const PART: usize = 128;
-
-/// `f(0)`, …, `f(count − 1)`.
-fn in_parts<R: Send>(count: usize, f: &(dyn Fn(usize) -> R + Sync)) -> impl Iterator<Item = R> + use<R> {
-    let part = |part: usize| (part * PART..count.min((part + 1) * PART)).map(f).collect::<Vec<R>>();
-    parallel::map(count.div_ceil(PART), &part).into_iter().flatten()
-}

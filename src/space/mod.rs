@@ -13,7 +13,6 @@ pub use nodes::Nodes;
 pub(crate) use nodes::bits;
 
 use crate::aggregation::Extension;
-use crate::parallel;
 use crate::pooled::{Pool, Pooled};
 use crate::scalar::Real;
 use crate::tensor::{Tensor, Vector};
@@ -76,8 +75,7 @@ impl<const D: usize> Space<D> {
         if self.followers.is_empty() {
             return None;
         }
-        let mut extended = self.pool.unspecified(field.len(), Vector::zeros());
-        parallel::zip(&mut extended, field, |extended, u| *extended = *u);
+        let mut extended = self.pool.copy_of(field);
         self.followers.extend(&mut extended);
         Some(extended)
     }

@@ -5,6 +5,9 @@ use crate::grid::{BRICK, Grid};
 use crate::tensor::Vector;
 use std::sync::Arc;
 
+/// Bricks in one part of the work of a thread.
+const BRICKS: usize = 32;
+
 /// The active nodes of one step. Their memory grows with the body, not with the box.
 ///
 /// ```
@@ -80,7 +83,12 @@ impl Nodes {
 
     /// Grid numbers of the active nodes, ascending.
     pub(crate) fn ids(&self) -> impl Iterator<Item = u64> {
-        self.bricks.iter().flat_map(|brick| bits(brick.active).map(|k| brick.number * BRICK + k))
+        ids_of(&self.bricks)
+    }
+
+    /// The active nodes in parts: the number of the first one, and the grid numbers of all.
+    pub(crate) fn parts(&self) -> impl Iterator<Item = (usize, impl Iterator<Item = u64> + Send)> {
+        self.bricks.chunks(BRICKS).map(|part| (part[0].first as usize, ids_of(part)))
     }
 
     /// Grid number of the active node with this number.
@@ -118,6 +126,11 @@ impl Nodes {
     pub fn positions<const D: usize>(&self, grid: &Grid<D>) -> impl Iterator<Item = ([u32; D], Vector<f64, D>)> {
         self.ids().map(|id| grid.index(id)).map(|index| (index, grid.position(index)))
     }
+}
+
+/// Grid numbers of the active nodes in some bricks, ascending.
+fn ids_of(bricks: &[Brick]) -> impl Iterator<Item = u64> {
+    bricks.iter().flat_map(|brick| bits(brick.active).map(|k| brick.number * BRICK + k))
 }
 
 /// The bits that are set, ascending.

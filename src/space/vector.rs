@@ -22,7 +22,7 @@
 //! assert!((memory.norm(&[3e200, 4e200]) / 5e200 - 1.0).abs() < 1e-15);
 //! ```
 
-use crate::parallel;
+use crate::parallel::{self, FEW};
 use crate::pooled::{Pool, Pooled};
 use std::ops::DerefMut;
 
@@ -113,15 +113,15 @@ impl Vectors for Pool {
     }
 
     fn unspecified(&self, n: usize) -> Pooled<f64> {
-        Pool::unspecified(self, n, 0.0)
+        Pool::unspecified(self, n)
     }
 
     fn clear(&self, y: &mut [f64]) {
-        y.fill(0.0);
+        parallel::fill(y, 0.0);
     }
 
     fn copy(&self, x: &[f64], y: &mut [f64]) {
-        y.copy_from_slice(x);
+        update(x, y, |x, _| x);
     }
 
     fn dot(&self, x: &[f64], y: &[f64]) -> f64 {
@@ -170,15 +170,12 @@ impl Vectors for Pool {
 /// Entries per partial sum.
 pub(crate) const CHUNK: usize = 2048;
 
-/// Below this length, waking the threads costs more than the work.
-const PARALLEL: usize = 8 * CHUNK;
-
 /// Independent accumulators inside a chunk, so that the compiler may use vector instructions without changing the order.
 const LANES: usize = 8;
 
 /// `Σ xᵢ yᵢ`
 pub(crate) fn dot(x: &[f64], y: &[f64]) -> f64 {
-    if x.len() < PARALLEL {
+    if x.len() < FEW {
         x.chunks(CHUNK).zip(y.chunks(CHUNK)).map(|(x, y)| dot_chunk(x, y)).sum()
     } else {
         let part = |k| Some(dot_chunk(x.chunks(CHUNK).nth(k)?, y.chunks(CHUNK).nth(k)?));
@@ -238,17 +235,9 @@ pub(crate) fn xpby(x: &[f64], b: f64, y: &mut [f64]) {
 }
 
 /// `yᵢ ← f(xᵢ, yᵢ)`
+#[track_caller]
 pub(crate) fn update(x: &[f64], y: &mut [f64], f: impl Fn(f64, f64) -> f64 + Sync) {
-    let chunk = |(x, y): (&[f64], &mut [f64])| {
-        for (x, y) in x.iter().zip(y) {
-            *y = f(*x, *y);
-        }
-    };
-    if y.len() < PARALLEL {
-        chunk((x, y));
-    } else {
-        parallel::for_each(x.chunks(CHUNK).zip(y.chunks_mut(CHUNK)), &chunk);
-    }
+    parallel::zip(y, x, |y, x| *y = f(*x, *y));
 }
 
 /// Calls `f([aᵢ, bᵢ, …], xᵢ, yᵢ)` for all entries. Returns y·y.
@@ -265,7 +254,7 @@ pub(crate) fn update_pair<const N: usize>(
         }
         dot_chunk(y, y)
     };
-    let is_short = y.len() < PARALLEL;
+    let is_short = y.len() < FEW;
     let parts = x.chunks_mut(CHUNK).zip(y.chunks_mut(CHUNK)).enumerate();
     if is_short { parts.map(chunk).sum() } else { parallel::collect(parts, &chunk).into_iter().sum() }
 }
@@ -294,7 +283,7 @@ mod tests {
     #[test]
     fn every_entry_counts_once() {
         // Sums of integers are exact in any order: Σ i = n(n+1)/2. The lengths lie around lanes, chunks and the switch to threads.
-        for n in [0, 1, 7, 8, 9, CHUNK - 1, CHUNK, CHUNK + 1, PARALLEL - 1, PARALLEL, PARALLEL + 5] {
+        for n in [0, 1, 7, 8, 9, CHUNK - 1, CHUNK, CHUNK + 1, FEW - 1, FEW, FEW + 5] {
             let x: Vec<f64> = (1..=n).map(|i| i as f64).collect();
             assert_eq!(dot(&x, &vec![1.0; n]), (n * (n + 1) / 2) as f64, "{n}");
             let mut y = x.clone();

@@ -21,6 +21,32 @@ fn any_number_of_threads_gives_the_same_bits() -> Result<(), Failure> {
     Ok(())
 }
 
+/// Loops over few nodes or particles stay on one thread. These two scenes have more: load steps with aggregation and multigrid, and dynamics with
+/// affine fits, consistent inertia and smoothing.
+#[test]
+fn long_loops_that_threads_share_give_the_same_bits() -> Result<(), Failure> {
+    let load_step = ["grid.spacing=0.25", "solver.newton.tolerance=1e-2"];
+    let dynamic = [
+        "grid.spacing=0.02",
+        "time.step=0.002",
+        "time.lumping=0.5",
+        "time.projection=\"affine\"",
+        "transfer={\"limited\": {\"rate\": 40}}",
+    ];
+    for (name, overrides) in [("cook.json", &load_step[..]), ("rebound.json", &dynamic)] {
+        let run = |threads| {
+            in_threads(threads, || {
+                let mut simulation = scene::<2>(name, overrides)?;
+                let report = simulation.advance()?;
+                assert!(report.active_nodes > 8 * 2048, "{} nodes are not cut into parts", report.active_nodes);
+                Ok((simulation.particles, report.newton.history.iterations.last().map(|last| last.residual)))
+            })
+        };
+        assert!(run(1)? == run(3)?, "{name}");
+    }
+    Ok(())
+}
+
 #[test]
 fn a_step_that_fails_is_halved_and_leaves_the_particles_alone() -> Result<(), Failure> {
     // Three Newton iterations are too few for a whole step of the hard impact, but not for a short one.

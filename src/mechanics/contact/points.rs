@@ -2,10 +2,14 @@
 
 use super::law::{ContactLaw, Ends};
 use crate::mechanics::loads::{BodyContact, Candidate, ContactConstants, Contacts, Pose, Share, SurfacePoint};
-use crate::mechanics::sweep::Connectivity;
+use crate::mechanics::sweep::{Connectivity, Number};
+use crate::parallel;
 use crate::scalar::Real;
 use crate::shape::Feature;
 use crate::tensor::{Tensor, Vector, identity};
+
+/// Points in one part of the work of a thread.
+const POINTS: usize = 128;
 
 /// The partner of a point in contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,35 +65,35 @@ pub(crate) struct Surroundings<'a, S, P, const D: usize> {
 type StepEnds<'a, const D: usize> = Option<([Vec<Pose<D>>; 2], &'a [Vector<f64, D>])>;
 
 /// All points that touch an obstacle, with the poses of all obstacles.
-pub(crate) fn obstacle_points<T: Real, const D: usize>(
+pub(crate) fn obstacle_points<T: Number, const D: usize>(
     contacts: &Contacts<D>,
-    around: &Surroundings<'_, impl Fn(usize) -> f64, impl Fn(&Carrier<D>) -> Vector<T, D>, D>,
+    around: &Surroundings<'_, impl Fn(usize) -> f64 + Sync, impl Fn(&Carrier<D>) -> Vector<T, D> + Sync, D>,
     poses: &[Pose<D, T>],
 ) -> Vec<ContactPoint<T, D>> {
     let Contacts { points, obstacles, .. } = contacts;
+    if obstacles.is_empty() {
+        return Vec::new();
+    }
     let poses_at = |t: f64| obstacles.iter().map(|obstacle| obstacle.pose(t)).collect::<Vec<Pose<D>>>();
     let ends = around.start.map(|(t_n, at)| ([poses_at(t_n), poses_at(2.0 * around.t - t_n)], at));
-    let mut found = Vec::new();
-    for number in (0..points.len()).filter(|_| !obstacles.is_empty()) {
+    parallel::list_by(POINTS, points.len(), |number, list| {
         let x = (around.position)(&Carrier::at(points[number].particle));
         let touched = |(index, pose)| obstacle_point(contacts, around, &ends, (number, &x), (index, pose));
-        found.extend(poses.iter().enumerate().filter_map(touched));
-    }
-    found
+        list.extend(poses.iter().enumerate().filter_map(touched));
+    })
 }
 
 /// All points that touch a free obstacle in a pose.
-pub(crate) fn points_on<T: Real, const D: usize>(
+pub(crate) fn points_on<T: Number, const D: usize>(
     contacts: &Contacts<D>,
-    around: &Surroundings<'_, impl Fn(usize) -> f64, impl Fn(&Carrier<D>) -> Vector<T, D>, D>,
+    around: &Surroundings<'_, impl Fn(usize) -> f64 + Sync, impl Fn(&Carrier<D>) -> Vector<T, D> + Sync, D>,
     index: usize,
     pose: &Pose<D, T>,
 ) -> Vec<ContactPoint<T, D>> {
-    let point = |(number, point): (usize, &SurfacePoint<D>)| {
-        let x = (around.position)(&Carrier::at(point.particle));
-        obstacle_point(contacts, around, &None, (number, &x), (index, pose))
-    };
-    contacts.points.iter().enumerate().filter_map(point).collect()
+    parallel::list_by(POINTS, contacts.points.len(), |number, list| {
+        let x = (around.position)(&Carrier::at(contacts.points[number].particle));
+        list.extend(obstacle_point(contacts, around, &None, (number, &x), (index, pose)));
+    })
 }
 
 /// The contact of a point with an obstacle; `None` without contact.
@@ -132,13 +136,14 @@ fn share(of_stiffness: f64, [own, other]: [f64; 2]) -> f64 {
 }
 
 /// All points that touch another body.
-pub(crate) fn pair_points<T: Real, const D: usize>(
+pub(crate) fn pair_points<T: Number, const D: usize>(
     contacts: &Contacts<D>,
-    around: &Surroundings<'_, impl Fn(usize) -> f64, impl Fn(&Carrier<D>) -> Vector<T, D>, D>,
+    around: &Surroundings<'_, impl Fn(usize) -> f64 + Sync, impl Fn(&Carrier<D>) -> Vector<T, D> + Sync, D>,
 ) -> Vec<ContactPoint<T, D>> {
     let Some(between) = &contacts.between else { return Vec::new() };
-    let candidates = between.candidates.iter().enumerate();
-    candidates.filter_map(|one| pair_point(contacts, between, one, around)).collect()
+    parallel::list_by(POINTS, between.candidates.len(), |number, list| {
+        list.extend(pair_point(contacts, between, (number, &between.candidates[number]), around));
+    })
 }
 
 /// The contact of a candidate; `None` without contact.

@@ -9,11 +9,13 @@
 //! Planes with the normals n' lie outside a convex surface, and planes with the normal n̄ inside it. Their mean is exact to third order.
 
 use crate::grid::Grid;
-use crate::mechanics::loads::{BodyContact, Candidate, Contacts, Pair, Share, SurfacePoint};
+use crate::mechanics::loads::{BodyContact, Candidate, Contacts, Pair, Share};
+use crate::parallel;
 use crate::particles::Particles;
 use crate::tensor::{Tensor, Vector, cofactor, identity, inverse};
-use std::cell::OnceCell;
-use std::collections::{BTreeMap, HashMap};
+use rustc_hash::FxHashMap;
+use std::collections::BTreeMap;
+use std::sync::OnceLock;
 
 /// The search reaches this many grid spacings.
 const REACH: u32 = 2;
@@ -38,6 +40,10 @@ const EDGE: [f64; 2] = [0.9, 0.6];
 /// The extent of a piece of surface around its point, in half edges of a square of the same area. The points of a Gauss rule are not the
 /// middles of their pieces. They lie up to 1.16 half edges from each other's middle, and blending takes another half.
 const EXTENT: f64 = 1.7;
+
+/// Points, and particles, in one part of the work of a thread.
+const POINTS: usize = 64;
+const PARTICLES: usize = 512;
 
 /// A point of a surface during a step.
 struct Place<const D: usize> {
@@ -100,7 +106,7 @@ pub(crate) fn candidates<const D: usize>(
     between: &BodyContact<D>,
     particles: &Particles<D>,
     grid: &Grid<D>,
-    motion: impl Fn(usize) -> Vector<f64, D>,
+    motion: impl Fn(usize) -> Vector<f64, D> + Sync,
 ) -> Vec<Candidate<D>> {
     let predicted = |number: usize| {
         let p = contacts.points[number].particle;
@@ -119,7 +125,7 @@ pub(crate) fn paths<const D: usize>(
     between: &BodyContact<D>,
     particles: &Particles<D>,
     grid: &Grid<D>,
-    ends: impl Fn(usize) -> [Vector<f64, D>; 2],
+    ends: impl Fn(usize) -> [Vector<f64, D>; 2] + Sync,
 ) -> Vec<Path> {
     let places = places(contacts, particles, ends);
     search(&places, between, grid).iter().map(Found::path).collect()
@@ -136,7 +142,7 @@ pub(crate) fn swallowed<const D: usize>(
 ) -> Vec<(usize, usize, f64, Vector<f64, D>)> {
     let places = places(contacts, particles, |number| [positions[contacts.points[number].particle]; 2]);
     let boxes = boxes(&places, 0.0);
-    let mut cells: HashMap<u64, Vec<&Place<D>>> = HashMap::new();
+    let mut cells: FxHashMap<u64, Vec<&Place<D>>> = FxHashMap::default();
     for place in &places {
         if let Some(cell) = grid.cell(&place.ends[0]) {
             cells.entry(grid.id(cell)).or_default().push(place);
@@ -160,23 +166,25 @@ pub(crate) fn swallowed<const D: usize>(
         both.is_some_and(|(one, other)| (0..D).all(|k| one[0][k] < other[1][k] && other[0][k] < one[1][k]))
     };
     let pairs: Vec<_> = between.pairs.iter().enumerate().filter(overlap).collect();
-    let solid = (0..particles.len()).filter(|&p| !pairs.is_empty() && particles.is_solid(p));
-    let mut found = Vec::new();
-    for p in solid {
+    if pairs.is_empty() {
+        return Vec::new();
+    }
+    parallel::list_by(PARTICLES, particles.len(), |p, found| {
         let inside =
             |&(pair, bodies): &(usize, &Pair)| lies_in(p, bodies).map(|(depth, normal)| (p, pair, depth, normal));
-        found.extend(pairs.iter().filter_map(inside));
-    }
-    found
+        if particles.is_solid(p) {
+            found.extend(pairs.iter().filter_map(inside));
+        }
+    })
 }
 
 /// The points near other bodies, by the cells that hold them at t_n.
 struct Near<'a, const D: usize> {
     grid: &'a Grid<D>,
-    cells: HashMap<u64, Vec<&'a Place<D>>>,
+    cells: FxHashMap<u64, Vec<&'a Place<D>>>,
     /// The results of [`Self::deepest`] and [`Self::edge`] by the number of the place. Many points see the same place.
-    deepest: Vec<OnceCell<f64>>,
-    edges: Vec<OnceCell<f64>>,
+    deepest: Vec<OnceLock<f64>>,
+    edges: Vec<OnceLock<f64>>,
 }
 
 impl<'a, const D: usize> Near<'a, D> {
@@ -266,7 +274,7 @@ fn search<'a, const D: usize>(
     between: &BodyContact<D>,
     grid: &'a Grid<D>,
 ) -> Vec<Found<'a, D>> {
-    let pairs: HashMap<[u32; 2], usize> =
+    let pairs: FxHashMap<[u32; 2], usize> =
         between.pairs.iter().zip(0..).map(|(pair, number)| (pair.bodies, number)).collect();
     let pair = |one: &Place<D>, other: u32| pairs.get(&[one.body.min(other), one.body.max(other)]).copied();
     let boxes = boxes(places, f64::from(REACH) * grid.spacing);
@@ -274,15 +282,16 @@ fn search<'a, const D: usize>(
         let mut others = boxes.iter().filter(|(body, _)| pair(place, **body).is_some());
         others.any(|(_, [low, high])| (0..D).all(|k| low[k] <= place.ends[0][k] && place.ends[0][k] <= high[k]))
     };
-    let unknown = || vec![OnceCell::new(); places.len()];
-    let mut near = Near { grid, cells: HashMap::new(), deepest: unknown(), edges: unknown() };
-    for place in places.iter().filter(is_near) {
+    let in_reach: Vec<&Place<D>> = places.iter().filter(is_near).collect();
+    let unknown = || vec![OnceLock::new(); places.len()];
+    let mut near = Near { grid, cells: FxHashMap::default(), deepest: unknown(), edges: unknown() };
+    for &place in &in_reach {
         if let Some(cell) = grid.cell(&place.ends[0]) {
             near.cells.entry(grid.id(cell)).or_default().push(place);
         }
     }
-    let mut found = Vec::new();
-    for place in places.iter().filter(is_near) {
+    parallel::list_by(POINTS, in_reach.len(), |number, found| {
+        let place = in_reach[number];
         let mut of_pairs: BTreeMap<usize, Vec<Seen<'a, D>>> = BTreeMap::new();
         for other in near.around(place) {
             if let Some((pair, seen)) = pair(place, other.body).zip(near.seen(place, other)) {
@@ -290,17 +299,17 @@ fn search<'a, const D: usize>(
             }
         }
         found.extend(of_pairs.into_iter().map(|(pair, seen)| near.closest(place, pair, seen)));
-    }
-    found
+    })
 }
 
 /// The points of all surfaces. `ends` are the positions of a point at both ends of the step.
 fn places<const D: usize>(
     contacts: &Contacts<D>,
     particles: &Particles<D>,
-    ends: impl Fn(usize) -> [Vector<f64, D>; 2],
+    ends: impl Fn(usize) -> [Vector<f64, D>; 2] + Sync,
 ) -> Vec<Place<D>> {
-    let place = |(number, point): (usize, &SurfacePoint<D>)| {
+    let place = |number: usize| {
+        let point = &contacts.points[number];
         let p = point.particle;
         let f = identity::<f64, D>() + particles.displacement_gradient[p];
         let area = cofactor(&f) * point.normal;
@@ -312,7 +321,7 @@ fn places<const D: usize>(
         let back = (identity::<f64, D>() + particles.reference().displacement_gradient[p]) * inverse(&f);
         Place { number, body: particles.body[p], ends: ends(number), normal: area / stretch, half, back }
     };
-    contacts.points.iter().enumerate().map(place).collect()
+    parallel::values_by(POINTS, contacts.points.len(), place)
 }
 
 /// The bounding box of the surface of each body at t_n, enlarged on all sides.

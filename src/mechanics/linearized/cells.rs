@@ -82,7 +82,7 @@ impl<const D: usize> CellRows<D> {
         phi: &[Vector<f64, D>],
         fill: impl Fn(usize, usize, &Tensor<f64, D>, usize, &mut [[f64; LANES]]) + Sync,
     ) -> Self {
-        let mut rows = connectivity.pool().unspecified(connectivity.groups() * layout.count, [0.0; LANES]);
+        let mut rows = connectivity.pool().unspecified(connectivity.groups() * layout.count);
         connectivity.fill_all_rows(phi, layout.count, &mut rows, |group, at, rows| {
             rows.fill([0.0; LANES]);
             for (lane, &p) in group.particles.iter().enumerate() {
@@ -149,7 +149,7 @@ impl<const D: usize> CellRows<D> {
 
     /// δv of every cell.
     pub(crate) fn volume_changes(&self, connectivity: &Connectivity<D>, u: &[Vector<f64, D>]) -> Vec<f64> {
-        let mut grown = connectivity.pool().unspecified(connectivity.groups(), [0.0; LANES]);
+        let mut grown = connectivity.pool().unspecified(connectivity.groups());
         connectivity.fill_all_rows(u, 1, &mut grown, |group, at, grown| {
             let b = &self.rows.of_group(group.number)[self.layout.b..];
             grown[0] = [0.0; LANES];

@@ -4,6 +4,7 @@ use super::curve::Curve;
 use super::motion_step::MotionStep;
 use super::rotation::Rotation;
 use crate::grid::Grid;
+use crate::parallel;
 use crate::shape::Shape;
 use crate::space::Nodes;
 use crate::tensor::Vector;
@@ -138,8 +139,12 @@ pub(crate) fn prescribed_dofs<const D: usize>(
     t: f64,
     dt: f64,
 ) -> Vec<PrescribedDof> {
-    let mut dofs = Vec::new();
-    for (node, (index, position)) in nodes.positions(grid).enumerate() {
+    if prescribed.is_empty() {
+        return Vec::new();
+    }
+    let of_node = |(node, id): (usize, u64)| {
+        let index = grid.index(id);
+        let position = grid.position(index);
         let x = position + moved.get(node).copied().unwrap_or_else(Vector::zeros);
         let mut holders = [None; D];
         for (owner, one) in prescribed.iter().enumerate().filter(|(_, one)| one.on.holds(grid, index, &position)) {
@@ -150,9 +155,9 @@ pub(crate) fn prescribed_dofs<const D: usize>(
                 }
             }
         }
-        dofs.extend(holders.into_iter().flatten());
-    }
-    dofs
+        holders.into_iter().flatten()
+    };
+    parallel::collect(nodes.parts(), &|(first, ids)| (first..).zip(ids).flat_map(of_node).collect::<Vec<_>>()).concat()
 }
 
 #[cfg(test)]

@@ -3,11 +3,12 @@
 use crate::grid::{Grid, indices};
 use crate::mechanics::loads::Prescribed;
 use crate::mechanics::sweep::Connectivity;
-use crate::parallel::{self, PART};
+use crate::parallel;
 use crate::particles::Particles;
 use crate::tensor::Vector;
 use std::cell::LazyCell;
 use std::collections::{BTreeSet, HashMap, HashSet};
+use std::ops::Range;
 
 /// Number of cells in one part of the work of a thread.
 const CELLS: usize = 256;
@@ -33,8 +34,12 @@ pub(crate) fn reached_conditions<const D: usize>(
     let of_cell = |cell: [u32; D]| -> BTreeSet<usize> { corners(cell).flat_map(holders).collect() };
     // The conditions that held a node of a cell at the last grid reset, with the nodal field.
     let held = LazyCell::new(|| -> HashSet<(u32, usize)> {
-        let cells = cells(at_reset, &field, grid).into_iter();
-        cells.flat_map(|(cell, field)| of_cell(grid.index(cell)).into_iter().map(move |one| (field, one))).collect()
+        let of_part = |part: &[(u64, u32)]| -> HashSet<(u32, usize)> {
+            let conditions =
+                |&(cell, field): &(u64, u32)| corners(grid.index(cell)).flat_map(holders).map(move |one| (field, one));
+            part.iter().flat_map(conditions).collect()
+        };
+        parallel::collect(cells(at_reset, &field, grid).chunks(CELLS), &of_part).into_iter().flatten().collect()
     });
     // The conditions of a cell, by condition and field, and whether a node there is not active yet.
     let conditions = |&(cell, field): &(u64, u32)| -> Vec<((u32, usize), bool)> {
@@ -142,20 +147,20 @@ pub(crate) fn touch<const D: usize>(particles: &Particles<D>, connectivity: &Con
 }
 
 /// The pairs of a cell's id and an item in that cell, sorted, each pair once.
-fn cells<const D: usize, T: Ord + Send>(
+fn cells<const D: usize, T: Ord + Copy + Send>(
     position: &[Vector<f64, D>],
     item: &(dyn Fn(usize) -> T + Sync),
     grid: &Grid<D>,
 ) -> Vec<(u64, T)> {
-    let of_part = |part: usize| {
-        let own = position.iter().enumerate().skip(part * PART).take(PART);
-        let mut cells: Vec<_> = own.filter_map(|(p, x)| Some((grid.id(grid.cell(x)?), item(p)))).collect();
+    let of_part = |part: Range<usize>| {
+        let own = part.filter_map(|p| Some((grid.id(grid.cell(&position[p])?), item(p))));
+        let mut cells: Vec<_> = own.collect();
         // Particles of a cell follow each other.
         cells.dedup();
         cells
     };
-    let mut cells: Vec<_> = parallel::map(position.len().div_ceil(PART), &of_part).into_iter().flatten().collect();
-    cells.sort_unstable();
+    let mut cells = parallel::collect(parallel::parts(position.len()), &of_part).concat();
+    parallel::sort(&mut cells);
     cells.dedup();
     cells
 }

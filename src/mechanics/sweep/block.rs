@@ -27,9 +27,14 @@ pub(super) struct Block {
     pub(super) nodes: Vec<u32>,
     /// Places in the box of these `nodes`.
     pub(super) places: Vec<u32>,
+    /// The active number of each place in the box, or [`NONE`]; empty in a block of another process.
+    pub(super) numbers: Vec<u32>,
     /// Active nodes of the box, as a bit set for each row along x.
     pub(super) active: Vec<u64>,
 }
+
+/// The number of a node that is not active.
+pub(super) const NONE: u32 = u32::MAX;
 
 /// The position of a group's window in the box, and of its weights in the array.
 #[derive(Clone, Copy, Debug)]
@@ -136,6 +141,7 @@ impl Block {
             + size_of_val(self.particles.as_slice())
             + size_of_val(self.nodes.as_slice())
             + size_of_val(self.places.as_slice())
+            + size_of_val(self.numbers.as_slice())
             + size_of_val(self.active.as_slice())
     }
 

@@ -317,7 +317,7 @@ impl<const D: usize> Connectivity<D> {
     }
 
     /// Calls `visit` for all groups, in the order of their numbers.
-    pub(crate) fn each_group(&self, mut visit: impl FnMut(Group<'_>)) {
+    pub(crate) fn each_group<'s>(&'s self, mut visit: impl FnMut(Group<'s>)) {
         dispatch!(self, one => one.each_group(&mut visit));
     }
 

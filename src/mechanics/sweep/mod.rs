@@ -24,7 +24,7 @@
 //!   Blocks do not depend on the number of threads, and their buffers are added in the order of the blocks.
 //!   So the result has the same bits for any number of threads.
 //!
-//! Threads are used here and in the vectors of the space.
+//! Passes share blocks between the threads. Other loops over nodes or particles share parts of fixed length.
 
 mod block;
 mod blocks;

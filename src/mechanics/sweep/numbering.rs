@@ -1,6 +1,6 @@
 //! The numbers of the active nodes in the boxes of the blocks.
 
-use super::block::Block;
+use super::block::{Block, NONE};
 use crate::grid::{BRICK, Grid, brick_edge};
 use crate::parallel::{self, Processes};
 use crate::space::{Nodes, bits};
@@ -56,17 +56,20 @@ pub(super) fn number<const D: usize>(grid: &Grid<D>, blocks: &mut [Block], proce
     let (all, _) = processes.joined(own);
     let nodes = Nodes::of_bricks(all);
     parallel::for_each(blocks.iter_mut(), &|block: &mut Block| {
-        let (mut numbers, mut places) = (std::mem::take(&mut block.nodes), std::mem::take(&mut block.places));
-        numbers.clear();
-        places.clear();
+        let [mut numbers, mut places, mut table] =
+            [&mut block.nodes, &mut block.places, &mut block.numbers].map(std::mem::take);
+        [&mut numbers, &mut places, &mut table].into_iter().for_each(Vec::clear);
+        table.resize(block.box_nodes(), NONE);
         for Part { brick, node, place, active } in parts(grid, block) {
             let number = nodes.numbers_in(brick);
             for k in bits(active) {
-                numbers.push(number(node + k));
-                places.push((place + k as usize) as u32);
+                let (number, place) = (number(node + k), place + k as usize);
+                numbers.push(number);
+                places.push(place as u32);
+                table[place] = number;
             }
         }
-        (block.nodes, block.places) = (numbers, places);
+        (block.nodes, block.places, block.numbers) = (numbers, places, table);
     });
     nodes
 }

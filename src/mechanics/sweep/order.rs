@@ -2,7 +2,7 @@
 
 use super::points::Points;
 use crate::grid::Grid;
-use crate::parallel;
+use crate::parallel::{self, PART};
 
 /// Edge of a block in cells. In 3D the nodal values that a block gathers and scatters then stay in the first-level cache.
 const fn edge(dimension: usize) -> u64 {
@@ -12,9 +12,6 @@ const fn edge(dimension: usize) -> u64 {
         _ => 4,
     }
 }
-
-/// Number of particles whose cells one task finds.
-const RUN: usize = 4096;
 
 /// A particle and its cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -48,16 +45,14 @@ pub(super) fn sorted<const D: usize>(
         }
         Some(block * cells::<D>() + local)
     };
-    let key_of = |particle: u32| Key { cell: 0, id: ids.map_or(particle, |ids| ids[particle as usize]), particle };
+    let key_of = |particle: u32| {
+        let (cell, id) = (place(particle).unwrap_or(u64::MAX), ids.map_or(particle, |ids| ids[particle as usize]));
+        Key { cell, id, particle }
+    };
     match keys.len() == positions.len() {
-        true => keys.iter_mut().for_each(|key| *key = key_of(key.particle)),
-        false => keys = (0..positions.len() as u32).map(key_of).collect(),
+        true => parallel::each_by(PART, &mut keys, |_, key| *key = key_of(key.particle)),
+        false => keys = parallel::values_by(PART, positions.len(), |p| key_of(p as u32)),
     }
-    parallel::for_each(keys.chunks_mut(RUN), &|keys| {
-        for key in keys {
-            key.cell = place(key.particle).unwrap_or(u64::MAX);
-        }
-    });
     sort(&mut keys);
     // Particles in no cell come last, by id.
     let outside = keys.partition_point(|key| key.cell < u64::MAX);

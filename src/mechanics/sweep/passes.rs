@@ -8,8 +8,6 @@ use crate::lanes::LANES;
 use crate::parallel::{First, Message};
 use crate::pooled::{Element, Pooled};
 use crate::tensor::{Tensor, Vector};
-use bytemuck::Pod;
-use num_traits::Zero;
 
 impl<const D: usize> Connectivity<D> {
     /// `f_I += Σ_p q N_I + σ ∇_r N_I` for C components: 1 or D. `point(group, u and L, q and σ)` adds to q and σ, which begin with
@@ -186,7 +184,7 @@ impl<const D: usize> Connectivity<D> {
     }
 
     /// `point(u and L, lane)` of all particles, or of the [own particles](Self::own_particles) of this process.
-    fn gathered<X: Element + Zero + Pod, const C: usize>(
+    fn gathered<X: Element, const C: usize>(
         &self,
         own_alone: bool,
         field: &[Vector<f64, C>],
@@ -197,11 +195,11 @@ impl<const D: usize> Connectivity<D> {
         let point = |_: usize, at: &[At<f64, C, D>], lane: usize| point(&at[0], lane);
         // If particles do not lie in the order of the passes, every process needs all of them.
         if own_alone && self.is_memory_order() {
-            let mut results = self.pool().unspecified(own.len(), X::zero());
+            let mut results = self.pool().unspecified(own.len());
             self.at_own_particles(1, field, mode, &mut results, point);
             return results;
         }
-        let mut results = self.pool().unspecified(self.particles(), X::zero());
+        let mut results = self.pool().unspecified(self.particles());
         self.at_own_particles(1, field, mode, &mut results[own], point);
         let count = size_of::<X>() / size_of::<f64>();
         self.in_memory_order(&mut results, |tiled, results| {

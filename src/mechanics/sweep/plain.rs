@@ -69,7 +69,7 @@ impl<const D: usize> Plain<D> {
         Group { number, particles: &self.particles[number * LANES..end] }
     }
 
-    pub(super) fn each_group(&self, visit: &mut dyn FnMut(Group<'_>)) {
+    pub(super) fn each_group<'s>(&'s self, visit: &mut dyn FnMut(Group<'s>)) {
         (0..self.groups()).for_each(|group| visit(self.group(group)));
     }
 

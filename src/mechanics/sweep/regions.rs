@@ -123,7 +123,7 @@ impl<const D: usize> Tiled<D> {
         if shared.is_none() && !self.in_parallel() {
             return self.add_in_turn(length, out, work, add);
         }
-        let mut boxes = self.pool.unspecified(own.iter().map(length).sum(), 0.0);
+        let mut boxes = self.pool.unspecified(own.iter().map(length).sum());
         let mut left = &mut boxes[..];
         let parts = own.iter().filter_map(|block| Some((block, left.split_off_mut(..length(block))?)));
         parallel::for_each_with(parts, &|scratch, (block, buffer): (&Block, &mut [f64])| {

@@ -117,7 +117,7 @@ impl Shares {
         let rank = self.processes.rank();
         let lengths = iter::zip(&self.interior.1, &self.interface.1).map(|(inner, at)| (inner + at) * numbers);
         let lengths: Vec<usize> = lengths.collect();
-        let mut all = pool.unspecified(lengths.iter().sum(), 0.0);
+        let mut all = pool.unspecified(lengths.iter().sum());
         let at = |node: u32| node as usize * numbers..(node as usize + 1) * numbers;
         let interior = |process: usize| {
             let start: usize = self.interior.1[..process].iter().sum();

@@ -3,7 +3,7 @@
 //!
 //! Particles are taken in the order (cell, id). [Groups and blocks](super) are defined on the page of the module.
 
-use super::block::Block;
+use super::block::{Block, NONE};
 use super::builder::Builder;
 use super::columns::Family;
 use super::foreign::Foreign;
@@ -157,32 +157,41 @@ impl<const D: usize> Tiled<D> {
 
     /// Renumbers the particles after they have been put into [`Self::order`].
     pub(super) fn rearrange(&mut self) {
-        self.keys.iter_mut().zip(0..).for_each(|(key, place)| key.particle = place);
+        parallel::each(&mut self.keys, |place, key| key.particle = place as u32);
         self.is_memory_order = true;
-        let mut next = 0;
-        for block in &mut self.blocks {
+        parallel::for_each(self.blocks.iter_mut(), &|block: &mut Block| {
+            let mut next = block.start;
             for (particles, window) in block.particles.iter_mut().zip(&block.windows) {
                 let lanes = u32::from(window.lanes);
                 particles.iter_mut().zip(next..next + lanes).for_each(|(particle, place)| *particle = place);
                 next += lanes;
             }
-        }
+        });
         self.find_slots();
     }
 
     /// Finds the slot of each particle.
     fn find_slots(&mut self) {
-        self.slots.resize(self.keys.len(), 0);
-        for block in &self.blocks {
+        let Self { slots, blocks, is_memory_order, .. } = self;
+        slots.resize(self.keys.len(), 0);
+        let of_block = |block: &Block, first: usize, slots: &mut [u32]| {
             for group in (0..block.len()).map(|group| block.group(group)) {
                 for (lane, &p) in group.particles.iter().enumerate() {
-                    self.slots[p as usize] = (group.number * LANES + lane) as u32;
+                    slots[p as usize - first] = (group.number * LANES + lane) as u32;
                 }
             }
+        };
+        if *is_memory_order {
+            let mut left = slots.as_mut_slice();
+            let part = |block: &'_ Block| left.split_off_mut(..block.count());
+            let parts = blocks.iter().zip(blocks.iter().filter_map(part));
+            parallel::for_each(parts, &|(block, slots)| of_block(block, block.start as usize, slots));
+        } else {
+            blocks.iter().for_each(|block| of_block(block, 0, slots));
         }
     }
 
-    pub(super) fn each_group(&self, visit: &mut dyn FnMut(Group<'_>)) {
+    pub(super) fn each_group<'s>(&'s self, visit: &mut dyn FnMut(Group<'s>)) {
         for block in &self.blocks {
             (0..block.len()).for_each(|group| visit(block.group(group)));
         }
@@ -213,9 +222,11 @@ impl<const D: usize> Tiled<D> {
             let start = block.start as usize;
             block = foreign.block(number, &self.keys[start..start + block.count()], block);
         }
-        let active = |(place, n, grad_n): (usize, f64, _)| {
-            Some((self.nodes.number(grid.id_in(block.field, block.index(place)))?, n, grad_n))
+        let number = |place: usize| match block.numbers.get(place) {
+            Some(&number) => (number != NONE).then_some(number as usize),
+            None => self.nodes.number(grid.id_in(block.field, block.index(place))),
         };
+        let active = |(place, n, grad_n): (usize, f64, _)| Some((number(place)?, n, grad_n));
         block.entries::<D>(group - block.first, lane).filter_map(active).collect()
     }
 }

@@ -50,7 +50,7 @@ impl<'a, const D: usize, L: Law> ContactForce<'a, D, L> {
     fn around<'x, T: Number>(
         &'x self,
         phi: &'x [Vector<T, D>],
-    ) -> Surroundings<'x, impl Fn(usize) -> f64, impl Fn(&Carrier<D>) -> Vector<T, D>, D> {
+    ) -> Surroundings<'x, impl Fn(usize) -> f64 + Sync, impl Fn(&Carrier<D>) -> Vector<T, D> + Sync, D> {
         let Step { particles, connectivity, time, alphas, .. } = self.step;
         let reference = particles.reference().position;
         Surroundings {

@@ -42,7 +42,7 @@ impl<'a, const D: usize, L: Law> Damping<'a, D, L> {
     /// The material part of the stiffness at φ_n, the nodal motion since the last grid reset, without U(J) of averaged bodies: the mean stress of
     /// a step without motion lacks U(J), and has the stiffness of the law.
     fn stiffness(step: &Step<'a, D, L>) -> Result<TangentRows, Inadmissible> {
-        let motion: Vec<_> = step.nodal.moved(step.connectivity.nodes()).collect();
+        let motion = step.nodal.motion_of(step.connectivity.nodes(), step.connectivity.pool());
         let averages = step.bodies.iter().any(Body::averages);
         mutant!("damping: particles of averaged cells have the stiffness of U(J)": averages = false);
         let alphas = Alphas { discrete_gradient: averages, ..step.alphas };
@@ -52,7 +52,7 @@ impl<'a, const D: usize, L: Law> Damping<'a, D, L> {
     /// The stiffness of averaged cells against a change of volume at φ_n.
     fn stiffness_of_cells(step: &Step<'a, D, L>) -> Option<CellRows<D>> {
         mutant!("damping: averaged cells have no stiffness of their own": { return None; });
-        let motion: Vec<_> = step.nodal.moved(step.connectivity.nodes()).collect();
+        let motion = step.nodal.motion_of(step.connectivity.nodes(), step.connectivity.pool());
         let alphas = Alphas { discrete_gradient: false, ..step.alphas };
         Some(MeanDilatation::of(&Step { alphas, ..*step })?.volumetric_stiffness(&motion))
     }
@@ -70,8 +70,8 @@ impl<const D: usize, L: Law> Damping<'_, D, L> {
     fn velocity<T: Number>(&self, phi: &[Vector<T, D>]) -> Vec<Vector<T, D>> {
         let Nodal { velocity, acceleration, .. } = self.step.nodal;
         let Alphas { dt, a4, a6, .. } = self.step.alphas;
-        let state = velocity.iter().zip(acceleration).zip(self.step.nodal.moved(phi.len()));
-        let known = state.map(|((v, a), motion)| v - v * (dt * a4) + a * a6 - motion * a4);
+        let state = velocity.iter().zip(acceleration).enumerate();
+        let known = state.map(|(node, (v, a))| v - v * (dt * a4) + a * a6 - self.step.nodal.moved(node) * a4);
         let all = phi.iter().zip(known);
         all.map(|(phi, known)| Vector::from_fn(|i, _| phi[i] * T::lit(a4) + T::lit(known[i]))).collect()
     }

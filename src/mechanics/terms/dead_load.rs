@@ -4,6 +4,7 @@ use super::term::{Role, Step, Sum, Term, summed};
 use crate::mechanics::kinematics::Inadmissible;
 use crate::mechanics::loads::{ForceField, Pressing};
 use crate::mechanics::sweep::Number;
+use crate::parallel;
 use crate::pooled::Pooled;
 use crate::tensor::Vector;
 
@@ -25,7 +26,7 @@ impl<const D: usize> DeadLoad<D> {
         if let Some(gravity) = &loads.gravity {
             // Σ_p m b N_I = m_I b: gravity is uniform, so the lumped mass already holds the sum.
             let b = gravity.acceleration * gravity.curve.value(step.time);
-            force.iter_mut().zip(&step.nodal.mass).for_each(|(force, &m)| *force = b * m);
+            parallel::zip(&mut force, &step.nodal.mass, |force, m| *force = b * *m);
         }
         if let Some(ForceField(field)) = &loads.field {
             let time = step.time;
@@ -71,7 +72,7 @@ impl<const D: usize> Term<D> for DeadLoad<D> {
     }
 
     fn add_at_nodes<T: Number>(&self, _: &[Vector<T, D>], out: &mut [Vector<T, D>]) {
-        out.iter_mut().zip(self.force.iter()).for_each(|(out, force)| *out -= force.map(T::lit));
+        parallel::zip(out, &self.force, |out, force| *out -= force.map(T::lit));
     }
 
     fn energy<T: Number>(&self, phi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>> {
@@ -80,6 +81,6 @@ impl<const D: usize> Term<D> for DeadLoad<D> {
     }
 
     fn add_magnitudes_at_nodes(&self, _: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
-        out.iter_mut().zip(self.force.iter()).for_each(|(out, force)| *out += force.abs());
+        parallel::zip(out, &self.force, |out, force| *out += force.abs());
     }
 }

@@ -9,6 +9,7 @@ use crate::mechanics::schemes::Alphas;
 use crate::mechanics::sweep::{Mode, Number};
 use crate::mechanics::transfer::Nodal;
 use crate::mechanics::trial::Trial;
+use crate::parallel;
 use crate::pooled::Pooled;
 use crate::tensor::{Tensor, Vector};
 
@@ -29,18 +30,17 @@ impl<'a, const D: usize> Inertia<'a, D> {
         }
         let mut predicted = Pooled::default();
         if mass.lumping < 1.0 {
-            let of_nodes = mass.connectivity.pool().collect(nodal.predicted(&alphas));
+            let of_nodes = mass.connectivity.pool().made(mass.lumped.len(), |node| nodal.predicted(&alphas, node));
             predicted = mass.connectivity.values(&of_nodes);
         }
         Some(Self { mass, nodal, alphas, predicted })
     }
 
-    /// ε m_I and a_I of every node.
-    fn motion<T: Number>(&self, phi: &[Vector<T, D>]) -> impl Iterator<Item = (T, Vector<T, D>)> {
-        phi.iter().zip(self.nodal.predicted(&self.alphas)).zip(self.mass.lumped).map(|((phi, predicted), m)| {
-            let a = Vector::from_fn(|i, _| T::lit(self.alphas.a1) * (phi[i] - T::lit(predicted[i])));
-            (T::lit(self.mass.lumping * m), a)
-        })
+    /// ε m_I and a_I of a node.
+    fn motion<T: Number>(&self, node: usize, phi: &Vector<T, D>) -> (T, Vector<T, D>) {
+        let predicted = self.nodal.predicted(&self.alphas, node);
+        let a = Vector::from_fn(|i, _| T::lit(self.alphas.a1) * (phi[i] - T::lit(predicted[i])));
+        (T::lit(self.mass.lumping * self.mass.lumped[node]), a)
     }
 }
 
@@ -50,17 +50,21 @@ impl<const D: usize> Term<D> for Inertia<'_, D> {
     }
 
     fn add_at_nodes<T: Number>(&self, phi: &[Vector<T, D>], out: &mut [Vector<T, D>]) {
-        out.iter_mut().zip(self.motion(phi)).for_each(|(out, (m, a))| *out += a * m);
+        parallel::each(out, |node, out| {
+            let (m, a) = self.motion(node, &phi[node]);
+            *out += a * m;
+        });
     }
 
     /// q = (1−ε) m a
     fn at_points<T: Number>(&self, _: Part, _: Trial<'_, T, D>) -> Option<(Mode, AtPoints<'_, T, D>)> {
-        let add: AtPoints<'_, T, D> = Box::new(|group, at, sums| {
+        let predicted: &[Vector<f64, D>] = &self.predicted;
+        let add: AtPoints<'_, T, D> = Box::new(move |group, at, sums| {
             for (lane, &p) in group.particles.iter().enumerate() {
                 let weight = T::lit(self.alphas.a1 * self.mass.consistent(p as usize));
                 mutant!("inertia: the residual lacks the consistent part": weight = T::zero());
                 for c in 0..D {
-                    sums.value[c][lane] += weight * (at.value[c][lane] - T::lit(self.predicted[p as usize][c]));
+                    sums.value[c][lane] += weight * (at.value[c][lane] - T::lit(predicted[p as usize][c]));
                 }
             }
             Ok(())
@@ -71,7 +75,10 @@ impl<const D: usize> Term<D> for Inertia<'_, D> {
     /// ½ a·M̃ a/α₁
     fn energy<T: Number>(&self, phi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>> {
         let half_over_a1 = T::lit(0.5 / self.alphas.a1);
-        let of_nodes = self.motion(phi).map(|(m, a)| half_over_a1 * m * a.dot(&a));
+        let of_nodes = phi.iter().enumerate().map(|(node, phi)| {
+            let (m, a) = self.motion(node, phi);
+            half_over_a1 * m * a.dot(&a)
+        });
         let (mut sum, mut magnitude) = summed(of_nodes);
         if self.mass.lumping < 1.0 {
             let half_a1 = T::lit(0.5 * self.alphas.a1);
@@ -89,10 +96,10 @@ impl<const D: usize> Term<D> for Inertia<'_, D> {
     /// The lumped mass stands for the whole mass, also for ε < 1: the consistent part is of the same size.
     fn add_magnitudes_at_nodes(&self, phi: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
         let Alphas { a1, a2, a3, .. } = self.alphas;
-        let state = self.nodal.velocity.iter().zip(&self.nodal.acceleration).zip(self.mass.lumped);
-        for ((out, phi), ((v, a), &m)) in out.iter_mut().zip(phi).zip(state) {
-            *out += (phi.abs() * a1 + v.abs() * a2 + a.abs() * a3.abs()) * m;
-        }
+        parallel::each(out, |node, out| {
+            let (v, a) = (self.nodal.velocity[node].abs(), self.nodal.acceleration[node].abs());
+            *out += (phi[node].abs() * a1 + v * a2 + a * a3.abs()) * self.mass.lumped[node];
+        });
     }
 
     fn linearize(&self, _: Trial<'_, f64, D>, _: Part, into: &mut Linearized<D>) -> Result<(), Inadmissible> {

@@ -1,7 +1,6 @@
 //! The internal force Σ_p V₀ F S ∇N (eq. 17), and its tangent, geometric and material (eqs. 34, 38).
 
 use super::term::{AtPoints, Step, Sum, Term, summed};
-use crate::lanes::LANES;
 use crate::material::Law;
 use crate::mechanics::constitutive::{Laws, Part};
 use crate::mechanics::kinematics::{Inadmissible, Kinematics};
@@ -32,7 +31,7 @@ impl<'a, const D: usize, L: Law> Stress<'a, D, L> {
         let form = self.laws.form();
         let count = form.rows(D);
         let own = self.connectivity.own_groups();
-        let mut rows = self.connectivity.pool().unspecified(own.len() * count, [0.0; LANES]);
+        let mut rows = self.connectivity.pool().unspecified(own.len() * count);
         let evaluate = self.laws.tangents(part, form);
         let failure = First::none();
         self.connectivity.fill_rows(phi, count, &mut rows, |group, at, rows| {

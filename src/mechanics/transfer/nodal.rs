@@ -5,8 +5,9 @@ use crate::mechanics::loads::PrescribedDof;
 use crate::mechanics::mass::{Mass, is_light, lumped, restricted};
 use crate::mechanics::schemes::Alphas;
 use crate::mechanics::sweep::Connectivity;
+use crate::parallel;
 use crate::particles::Particles;
-use crate::pooled::Pooled;
+use crate::pooled::{Pool, Pooled};
 use crate::solver::LinearError;
 use crate::space::Space;
 use crate::tensor::Vector;
@@ -116,16 +117,19 @@ impl<const D: usize> Nodal<D> {
         self.velocity.is_empty()
     }
 
-    /// φ_n of every node; zero right after a grid reset.
-    pub(crate) fn moved(&self, count: usize) -> impl Iterator<Item = Vector<f64, D>> {
-        let motion = self.motion.iter().copied().chain(std::iter::repeat(Vector::zeros()));
-        motion.take(count)
+    /// φ_n of a node; zero right after a grid reset.
+    pub(crate) fn moved(&self, node: usize) -> Vector<f64, D> {
+        self.motion.get(node).copied().unwrap_or_else(Vector::zeros)
     }
 
-    /// φ_n + Δφ̂ of every node: the motion that ends without acceleration. Empty without inertia.
-    pub fn predicted(&self, alphas: &Alphas) -> impl Iterator<Item = Vector<f64, D>> {
-        let state = self.velocity.iter().zip(&self.acceleration).zip(self.moved(self.velocity.len()));
-        state.map(|((v, a), motion)| motion + alphas.predicted(v, a))
+    /// φ_n at so many nodes.
+    pub(crate) fn motion_of(&self, nodes: usize, pool: &Pool) -> Pooled<Vector<f64, D>> {
+        pool.made(nodes, |node| self.moved(node))
+    }
+
+    /// φ_n + Δφ̂ of a node: the motion that ends without acceleration. Only with inertia.
+    pub(crate) fn predicted(&self, alphas: &Alphas, node: usize) -> Vector<f64, D> {
+        self.moved(node) + alphas.predicted(&self.velocity[node], &self.acceleration[node])
     }
 
     /// a_I = −R_I / m_I, with R the residual of this state without acceleration.
@@ -181,9 +185,7 @@ impl<const D: usize> Nodal<D> {
 fn divide<const D: usize>(particles: &Particles<D>, space: &Space<D>, mass: &[f64], p: &mut [Vector<f64, D>]) {
     let is_light = is_light(particles);
     space.followers().restrict(p);
-    for (p, &m) in p.iter_mut().zip(&*restricted(space, mass)) {
-        *p = if is_light(m) { Vector::zeros() } else { *p / m };
-    }
+    parallel::zip(p, &restricted(space, mass), |p, &m| *p = if is_light(m) { Vector::zeros() } else { *p / m });
     space.followers().extend(p);
 }
 

@@ -103,10 +103,10 @@ impl<'a, const D: usize> Update<'a, D> {
         walls: WallUpdate,
         dphi: &'a [Vector<f64, D>],
     ) -> Self {
-        let state = || dphi.iter().zip(&nodal.velocity).zip(&nodal.acceleration);
-        let increments = || state().map(|((dphi, v), a)| alphas.increments(dphi, v, a));
-        let mut delta_velocity = nodal.velocity.pool().collect(increments().map(|both| both.0));
-        let mut delta_acceleration = nodal.velocity.pool().collect(increments().map(|both| both.1));
+        let (pool, count) = (nodal.velocity.pool(), nodal.velocity.len());
+        let increments = |node: usize| alphas.increments(&dphi[node], &nodal.velocity[node], &nodal.acceleration[node]);
+        let mut delta_velocity = pool.made(count, |node| increments(node).0);
+        let mut delta_acceleration = pool.made(count, |node| increments(node).1);
         let mut impulses = vec![0.0; prescribed.len()];
         for (dof, impulse) in prescribed.iter().zip(&mut impulses).filter(|_| !nodal.is_static()) {
             let (node, i) = (dof.node, dof.component);
@@ -124,8 +124,7 @@ impl<'a, const D: usize> Update<'a, D> {
         }
         let mut kept = None;
         if !nodal.motion.is_empty() {
-            let sums = nodal.motion.iter().zip(dphi).map(|(motion, dphi)| motion + dphi);
-            kept = Some(nodal.motion.pool().collect(sums));
+            kept = Some(nodal.motion.pool().made(dphi.len(), |node| nodal.moved(node) + dphi[node]));
             mutant!("transfer: the end of a step forgets the motion on a kept grid": { kept = Some(nodal.motion.pool().collect(dphi.iter().copied())); });
         }
         Self { dphi, kept, delta_velocity, delta_acceleration, impulses, ..Self::default() }
@@ -150,9 +149,8 @@ impl<'a, const D: usize> Update<'a, D> {
         space.followers().extend(&mut self.delta_velocity);
         space.followers().extend(&mut self.delta_acceleration);
         // The change of outer nodes that follow a wall node is an impulse of the wall, too.
-        by_forces.iter_mut().zip(&self.delta_velocity).zip(&nodal.mass).for_each(|((before, after), &m)| {
-            *before = (after - *before) * m;
-        });
+        let after = &self.delta_velocity;
+        parallel::each(&mut by_forces, |node, before| *before = (after[node] - *before) * nodal.mass[node]);
         space.followers().restrict(&mut by_forces);
         for (&(node, component), impulse) in space.prescribed().iter().zip(&mut self.impulses) {
             *impulse += by_forces[node][component];
@@ -174,10 +172,10 @@ impl<'a, const D: usize> Update<'a, D> {
         let mass = &particles.mass;
         let mut squares = 0.0;
         if !self.delta_acceleration.is_empty() {
-            let changes = connectivity.values(&self.delta_acceleration);
-            squares = mass.iter().zip(&*changes).map(|(m, a)| m * a.norm_squared()).sum();
+            let changes = &*connectivity.values(&self.delta_acceleration);
+            squares = parallel::sum(mass.len(), |p| mass[p] * changes[p].norm_squared());
         }
-        constant.abs() * dt * dt * (squares / mass.iter().sum::<f64>()).sqrt()
+        constant.abs() * dt * dt * (squares / parallel::sum(mass.len(), |p| mass[p])).sqrt()
     }
 
     /// Stores the change of the particles' present v and a by `smoothing`; `mass` is the lumped mass of the nodes.
@@ -212,20 +210,21 @@ impl<'a, const D: usize> Update<'a, D> {
     /// The nodal state at the end of the step, without the mass, from the state `projected`.
     pub(crate) fn end(&self, projected: &Nodal<D>, pool: &Pool) -> Nodal<D> {
         let sum = |field: &[Vector<f64, D>], delta: &[Vector<f64, D>]| {
-            pool.collect(field.iter().zip(delta).map(|(field, delta)| field + delta))
+            pool.made(field.len(), |node| field[node] + delta[node])
         };
         Nodal {
             velocity: sum(&projected.velocity, &self.delta_velocity),
             acceleration: sum(&projected.acceleration, &self.delta_acceleration),
-            motion: pool.collect(self.motion().iter().copied()),
+            motion: pool.copy_of(self.motion()),
             out_of_balance: projected.out_of_balance.clone(),
             ..Nodal::default()
         }
     }
 
     /// Δφ/Δt
-    pub(crate) fn rate(&self, dt: f64) -> Vec<Vector<f64, D>> {
-        self.dphi.iter().map(|dphi| dphi / dt).collect()
+    pub(crate) fn rate(&self, dt: f64, pool: &Pool) -> Pooled<Vector<f64, D>> {
+        let dphi = self.dphi;
+        pool.made(dphi.len(), |node| dphi[node] / dt)
     }
 
     /// Δx since the last grid reset, of this process's particles.
@@ -247,8 +246,7 @@ impl<'a, const D: usize> Update<'a, D> {
     ) -> Option<(usize, Vector<f64, D>)> {
         let (own, moved) = (connectivity.own_particles(), self.moved(connectivity));
         let (position, id) = (&particles.reference().position[own.clone()], &particles.id[own]);
-        let first = parallel::map(moved.len().div_ceil(PART), &|part| {
-            let own = part * PART..moved.len().min((part + 1) * PART);
+        let first = parallel::collect(parallel::parts(moved.len()), &|own: Range<usize>| {
             let ends = own.map(|p| (id[p] as usize, position[p] + moved[p]));
             ends.filter(|(_, x)| !grid.contains(x)).min_by_key(|(id, _)| *id)
         });
@@ -267,7 +265,7 @@ impl<'a, const D: usize> Update<'a, D> {
         dt: f64,
     ) -> Option<usize> {
         let variable_count = particles.variable_count;
-        let (mut next, undefined) = (particles.memory.clone(), First::none());
+        let (mut next, undefined) = (parallel::copy_of(&particles.memory), First::none());
         if variable_count > 0 || !particles.dilatation.is_empty() {
             let (own, gradients) = (connectivity.own_particles(), self.gradients(connectivity));
             let update = |p: usize, next: &mut [f64]| {

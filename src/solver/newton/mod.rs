@@ -14,6 +14,7 @@ use super::conjugate_gradient::ConjugateGradientSettings;
 use super::forcing::LOOSEST;
 use super::gmres::GmresSettings;
 use super::{LinearOutcome, LinearReport, Linearization, NonlinearProblem, Preconditioner, System};
+use crate::parallel;
 use crate::pooled::{Pool, Pooled};
 use crate::space::vector::{Vectors, dot, norm, xpby};
 use settings::DEFAULT_RESTART;
@@ -174,7 +175,7 @@ impl<E: std::error::Error + 'static> Newton<'_, E> {
         let Some((step_length, residual, merit)) = self.search(&d, krylov.relative_residual)? else {
             return Ok(None);
         };
-        self.x.copy_from_slice(&self.trial);
+        parallel::copy(&self.trial, self.x);
         std::mem::swap(&mut self.r, &mut self.r_trial);
         self.residual = residual;
         let ratio = residual / before;
@@ -192,7 +193,7 @@ impl<E: std::error::Error + 'static> Newton<'_, E> {
     ) -> Result<(Pooled<f64>, LinearReport), LinearSolverFailure> {
         let pool = self.r.pool().clone();
         let size = self.residual.log2().floor().exp2();
-        let rhs = pool.collect(self.r.iter().map(|r| -r / size));
+        let rhs = pool.made(self.r.len(), |i| -self.r[i] / size);
         let mut d = pool.filled(rhs.len(), 0.0);
         let krylov = match tangent.on_device() {
             None => {
@@ -212,7 +213,7 @@ impl<E: std::error::Error + 'static> Newton<'_, E> {
                 krylov?
             }
         };
-        d.iter_mut().for_each(|d| *d *= size);
+        parallel::each(&mut d, |_, d| *d *= size);
         Ok((d, krylov))
     }
 
@@ -263,7 +264,7 @@ impl<E: std::error::Error + 'static> Newton<'_, E> {
         let mut length = 1.0;
         for halvings in 0..=MAX_HALVINGS {
             length = 0.5_f64.powi(halvings);
-            self.trial.copy_from_slice(d);
+            parallel::copy(d, &mut self.trial);
             xpby(self.x, length, &mut self.trial);
             self.history.counts.residuals += 1;
             self.history.counts.line_search += usize::from(halvings > 0);

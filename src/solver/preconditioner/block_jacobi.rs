@@ -37,7 +37,7 @@ impl<const D: usize> BlockJacobi<D> {
         if self.inverse.is_empty() {
             self.inverse = tangent.diagonal_blocks();
             let blocks: &mut [Tensor<f64, D>] = bytemuck::cast_slice_mut(&mut self.inverse);
-            blocks.iter_mut().for_each(|block| *block = invert_block(block));
+            parallel::each_by(PART, blocks, |_, block| *block = invert_block(block));
         }
     }
 }

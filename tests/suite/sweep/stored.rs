@@ -39,11 +39,11 @@ fn bytes_are_those_of_the_arrays<const D: usize>() -> Result<(), Failure> {
     let entries: usize = (0..positions.len()).map(|p| plain.of(p).count()).sum();
     // An entry is a node, N and ∇N. Each particle stores its position in memory and the start of its entries.
     assert_eq!(plain.bytes(), entries * (4 + 8 + 8 * D) + 4 * positions.len() + 8 * (positions.len() + 1));
-    // Weights of every window, eight lanes wide; the particles of each lane; a slot of each particle; the nodes twice.
+    // Weights of every window, eight lanes wide; the particles of each lane; a slot of each particle; the nodes three times.
     let (tiled, nodes) = Connectivity::new(&Approximation::from(Linear), &grid, &positions)?;
     let windows = tiled.windows();
     let weights: usize = windows.iter().map(|(width, _)| 2 * 64 * width[..D].iter().sum::<usize>()).sum();
-    let least = weights + windows.len() * (8 * 4 + 12) + 4 * positions.len() + 8 * nodes.len();
+    let least = weights + windows.len() * (8 * 4 + 12) + 4 * positions.len() + 12 * nodes.len();
     assert!((least..least + 512).contains(&tiled.bytes()), "{} for at least {least}", tiled.bytes());
     Ok(())
 }

@@ -183,7 +183,7 @@ impl Filter {
         let (r, scale): (&[Vector<f64, D>], &[Vector<f64, D>]) =
             (bytemuck::cast_slice(r), bytemuck::cast_slice(&self.scale));
         let unknowns = self.lines[0].nodes.len();
-        let [mut x, mut before] = [(); 2].map(|()| self.pool.unspecified(unknowns, Vector::<f64, D>::zeros()));
+        let [mut x, mut before] = [(); 2].map(|()| self.pool.unspecified::<Vector<f64, D>>(unknowns));
         self.lines[D - 1].invert(if D == 1 { 2 } else { 1 }, &mut x, &|nodes, x| {
             for (x, &node) in x.iter_mut().zip(nodes) {
                 *x = r[node as usize].component_mul(&scale[node as usize]);
@@ -201,8 +201,8 @@ impl Filter {
         }
         let places = &self.lines[last].places;
         let z: &mut [Vector<f64, D>] = bytemuck::cast_slice_mut(z);
-        parallel::for_each(z.chunks_mut(PART).enumerate(), &|(part, z): (usize, &mut [Vector<f64, D>])| {
-            for (node, z) in (part * PART..).zip(z).filter(|(node, _)| places[*node] != NONE) {
+        parallel::each(z, |node, z| {
+            if places[node] != NONE {
                 *z += x[places[node] as usize].component_mul(&scale[node]) * self.unit;
             }
         });

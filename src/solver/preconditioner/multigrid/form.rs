@@ -1,6 +1,7 @@
 //! The data of an operator from which multigrid makes its coarse levels.
 
 use crate::aggregation::{Extension, Occupied, Pieces};
+use crate::parallel;
 use crate::space::Followers;
 use rustc_hash::FxHashMap;
 
@@ -34,13 +35,11 @@ pub struct LocalForm {
 }
 
 impl LocalForm {
-    /// Appends a cell of zeros, with `tiles` entries of A.
-    pub(crate) fn push_cell(&mut self, index: [u32; 3], tiles: usize) {
-        self.cells.push(index);
-        self.centres.push([0.0; 3]);
-        self.filled.push(0.0);
-        self.masses.push(0.0);
-        self.tangents.resize(tiles * self.cells.len(), 0.0);
+    /// Zeros for all cells, with `tiles` entries of A for each.
+    pub(crate) fn make_room(&mut self, tiles: usize) {
+        let count = self.cells.len();
+        (self.centres, self.filled, self.masses) = (vec![[0.0; 3]; count], vec![0.0; count], vec![0.0; count]);
+        self.tangents = vec![0.0; tiles * count];
     }
 
     /// Divides the weighted sums in `centres` by the sums of their weights, `filled`.
@@ -73,19 +72,27 @@ impl LocalForm {
         for (cell, index) in self.cells.iter().enumerate() {
             let coarse = index.map(|i| i / 2);
             let at = *places.entry(coarse).or_insert_with(|| {
-                next.push_cell(coarse, tiles);
+                next.cells.push(coarse);
                 finer.push(Vec::new());
                 next.cells.len() - 1
             });
             finer[at].push(cell);
-            // Lengths are in cells, so on the coarse grid a volume is smaller by 2^D, and a gradient larger by 2.
+        }
+        next.make_room(tiles);
+        // Lengths are in cells, so on the coarse grid a volume is smaller by 2^D, and a gradient larger by 2.
+        for (at, cell) in finer.iter().enumerate().flat_map(|(at, finer)| finer.iter().map(move |&cell| (at, cell))) {
             let share = self.filled[cell] / f64::from(1 << D);
             next.filled[at] += share;
             next.masses[at] += self.masses[cell];
             (0..D).for_each(|k| next.centres[at][k] += share * 0.5 * self.centres[cell][k]);
             mutant!("multigrid: centroids of coarse cells are a tenth off": { (0..D).for_each(|k| next.centres[at][k] += share * 0.05 * self.centres[cell][k]); });
-            (0..tiles).for_each(|t| next.tangents[at * tiles + t] += 0.25 * self.tangents[cell * tiles + t]);
         }
+        parallel::rows(&mut next.tangents, tiles, |at, sums| {
+            for &cell in &finer[at] {
+                let tangents = &self.tangents[cell * tiles..(cell + 1) * tiles];
+                sums.iter_mut().zip(tangents).for_each(|(sum, one)| *sum += 0.25 * one);
+            }
+        });
         next.finish_centres();
         finer
     }
@@ -98,9 +105,8 @@ mod tests {
     /// A full cell and a quarter of the next one fill 0.625 of a coarse cell. Their centroid lies at (1·0.5 + ¼·1.125)/1.25 in fine cells.
     #[test]
     fn coarse_cells_have_the_centroid_of_what_is_in_them() {
-        let mut fine = LocalForm { grid: [2, 0, 0], ..LocalForm::default() };
-        fine.push_cell([0, 0, 0], 1);
-        fine.push_cell([1, 0, 0], 1);
+        let mut fine = LocalForm { grid: [2, 0, 0], cells: vec![[0, 0, 0], [1, 0, 0]], ..LocalForm::default() };
+        fine.make_room(1);
         (fine.centres, fine.filled) = (vec![[0.5, 0.0, 0.0], [1.125, 0.0, 0.0]], vec![1.0, 0.25]);
         let mut coarse = LocalForm::default();
         assert_eq!(fine.add_cells_to::<1>(&mut coarse), [[0, 1]]);

@@ -51,7 +51,13 @@ impl Interpolation {
         [&self.around, &self.within]
     }
 
-    fn row(&self, fine: usize) -> (&[u32], f64) {
+    /// The finer nodes that are interpolated from a coarse node, ascending.
+    pub(crate) fn finer(&self, coarse: usize) -> &[u32] {
+        self.within.row(coarse)
+    }
+
+    /// The coarse nodes around a finer node, and their weight.
+    pub(crate) fn row(&self, fine: usize) -> (&[u32], f64) {
         let list = self.around.row(fine);
         // The number of corners is a power of two.
         (list, 1.0 / list.len() as f64)
@@ -72,10 +78,10 @@ impl Interpolation {
 
     /// Pᵀ r, with zero for the `fixed` values of r.
     pub(crate) fn restrict<const D: usize>(&self, fixed: &[bool], r: &[Vector<f64, D>]) -> Vec<Vector<f64, D>> {
-        let mut out = vec![Vector::zeros(); self.within.len()];
+        let mut out = bytemuck::zeroed_vec::<Vector<f64, D>>(self.within.len());
         parallel::for_each(out.chunks_mut(PART).enumerate(), &|(part, out): (usize, &mut [Vector<f64, D>])| {
             for (node, out) in out.iter_mut().enumerate() {
-                for &fine in self.within.row(part * PART + node) {
+                for &fine in self.finer(part * PART + node) {
                     let fine = fine as usize;
                     let weight = self.row(fine).1;
                     (0..D).filter(|&i| !fixed[fine * D + i]).for_each(|i| out[i] += weight * r[fine][i]);

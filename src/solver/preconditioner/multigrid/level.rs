@@ -4,6 +4,7 @@ use super::cycle::Coarse;
 use super::form::LocalForm;
 use super::interpolation::Interpolation;
 use crate::gpu::{self, Gpu};
+use crate::lists::Lists;
 use crate::parallel;
 use crate::pooled::{Pool, Pooled};
 use crate::solver::LinearOperator;
@@ -20,8 +21,9 @@ use std::borrow::Cow;
 const MIDDLE: usize = 13;
 /// Rows in one part of the work of a thread.
 const ROWS: usize = 128;
-/// Cells whose matrices are in memory at once.
-const CELLS: usize = 64;
+/// Cells whose matrices are in memory at once: this part of all, within these bounds.
+const BATCHES: usize = 16;
+const CELLS: [usize; 2] = [512, 1 << 14];
 /// The distance of a point of Gauss from the middle of an interval of length ½: 1/(4 √3).
 const GAUSS: f64 = 0.144_337_567_297_406_43;
 /// The number of a neighbour that does not exist.
@@ -56,7 +58,7 @@ impl<const D: usize> LinearOperator for Level<D> {
         }
         self.multiply(bytemuck::cast_slice(&extended), bytemuck::cast_slice_mut(y));
         self.followers.restrict::<f64>(bytemuck::cast_slice_mut(y));
-        y.iter_mut().zip(&self.held).filter(|(_, held)| **held).for_each(|(y, _)| *y = 0.0);
+        self.clear_held(y);
     }
 }
 
@@ -119,11 +121,12 @@ impl<const D: usize> Level<D> {
             let to = [0, 1, 2].map(|k| (index[k] + steps[k] as u32).checked_sub(1).unwrap_or(NONE));
             numbers.get(&to).copied().unwrap_or(NONE)
         };
-        let neighbours = next.nodes.iter().map(|&index| std::array::from_fn(|place| neighbour(index, place)));
+        let count = next.nodes.len();
+        let neighbours = |node: usize| std::array::from_fn(|place| neighbour(next.nodes[node], place));
         let mut level = Self {
-            held: Self::held(form, &interpolation, next.nodes.len()),
-            neighbours: neighbours.collect(),
-            entries: vec![[Tensor::zeros(); 27]; next.nodes.len()],
+            held: Self::held(form, &interpolation, count),
+            neighbours: parallel::values_by(ROWS, count, neighbours),
+            entries: bytemuck::zeroed_vec(count),
             fixed_finer: form.fixed(),
             interpolation,
             ..Self::default()
@@ -161,17 +164,22 @@ impl<const D: usize> Level<D> {
 
     /// Adds the nodal terms Pᵀ B P. The next form gets their row sums.
     fn add_nodes(&mut self, form: &LocalForm, next: &mut LocalForm) {
-        let mut lumped = vec![Tensor::<f64, D>::zeros(); next.nodes.len()];
         let blocks: &[Tensor<f64, D>] = bytemuck::cast_slice(&form.blocks);
-        for ((list, weight), own) in self.interpolation.rows().zip(blocks) {
-            for &a in list {
-                lumped[a as usize] += own * weight;
-                for &b in list {
-                    let at = place(next.nodes[a as usize], next.nodes[b as usize]);
-                    self.entries[a as usize][at] += own * (weight * weight);
-                }
-            }
+        if blocks.is_empty() {
+            return;
         }
+        let (interpolation, nodes) = (&self.interpolation, &next.nodes);
+        let finer = |node: usize| {
+            let of = |&fine: &u32| (interpolation.row(fine as usize), &blocks[fine as usize]);
+            interpolation.finer(node).iter().map(of)
+        };
+        parallel::each_by(ROWS, &mut self.entries, |a, row| {
+            for ((list, weight), own) in finer(a) {
+                list.iter().for_each(|&b| row[place(nodes[a], nodes[b as usize])] += own * (weight * weight));
+            }
+        });
+        let lumped = |node: usize| finer(node).fold(Tensor::zeros(), |sum, ((_, weight), own)| sum + own * weight);
+        let lumped: Vec<Tensor<f64, D>> = parallel::values_by(ROWS, nodes.len(), lumped);
         next.blocks = bytemuck::cast_slice(&lumped).to_vec();
     }
 
@@ -183,19 +191,38 @@ impl<const D: usize> Level<D> {
         finer: &[Vec<usize>],
         numbers: &FxHashMap<[u32; 3], u32>,
     ) {
-        for first in (0..finer.len()).step_by(CELLS) {
-            let count = CELLS.min(finer.len() - first);
+        let nodes = |cell: usize| -> Vec<u32> {
+            nodes_of::<D>(next.cells[cell]).filter_map(|node| numbers.get(&node).copied()).collect()
+        };
+        let mut corners = Lists::default();
+        parallel::values_by(ROWS, finer.len(), nodes).into_iter().for_each(|nodes| corners.push(nodes));
+        let cells_of_nodes = corners.transposed(next.nodes.len());
+        let Self { entries, neighbours, .. } = self;
+        let batch = finer.len().div_ceil(BATCHES).clamp(CELLS[0], CELLS[1]);
+        for first in (0..finer.len()).step_by(batch) {
+            let count = batch.min(finer.len() - first);
             let matrices = parallel::map(count, &|k| cell_matrix::<D>(form, next.cells[first + k], &finer[first + k]));
-            for (cell, matrix) in next.cells[first..].iter().zip(matrices) {
-                let corners: Vec<_> =
-                    nodes_of::<D>(*cell).map(|node| numbers.get(&node).map(|&number| number as usize)).collect();
-                for (pair, block) in matrix.into_iter().enumerate() {
-                    if let (Some(a), Some(b)) = (corners[pair >> D], corners[pair % (1 << D)]) {
-                        self.entries[a][place(next.nodes[a], next.nodes[b])] += block;
+            // Every node takes the matrices of its cells in the order of the cells.
+            parallel::each_by(ROWS, entries, |node, row| {
+                for &cell in cells_of_nodes.row(node) {
+                    let Some(matrix) = (cell as usize).checked_sub(first).and_then(|k| matrices.get(k)) else {
+                        continue;
+                    };
+                    let corner = |k: usize| (next.nodes[node][k] - next.cells[cell as usize][k]) as usize;
+                    let a: usize = (0..D).map(|k| corner(k) << k).sum();
+                    for (other, block) in nodes_of::<D>(next.cells[cell as usize]).zip(&matrix[a << D..]) {
+                        let place = place(next.nodes[node], other);
+                        if neighbours[node][place] != NONE {
+                            row[place] += block;
+                        }
                     }
                 }
-            }
+            });
         }
+    }
+
+    fn clear_held(&self, x: &mut [f64]) {
+        parallel::zip(x, &self.held, |x, held| *x = if *held { 0.0 } else { *x });
     }
 
     /// Lets outer nodes follow others, except at held values.
@@ -209,23 +236,24 @@ impl<const D: usize> Level<D> {
 
     /// Holds unknowns that no cell reaches. Finer nodes interpolated from them have hardly any mass and no stiffness.
     fn hold_empty(&mut self, next: &LocalForm) {
-        for (k, held) in self.held.iter_mut().enumerate() {
-            *held |= !next.follows[k] && self.entries[k / D][MIDDLE][(k % D, k % D)] == 0.0;
-        }
+        let Self { held, entries, .. } = self;
+        parallel::each(held, |k, held| {
+            *held |= !next.follows[k] && entries[k / D][MIDDLE][(k % D, k % D)] == 0.0;
+        });
     }
 
     /// Clears the rows and columns of held values.
     fn hold(&mut self) {
         let Self { entries, neighbours, held, .. } = self;
-        for (node, (row, neighbours)) in entries.iter_mut().zip(neighbours).enumerate() {
-            for (entry, &mut other) in row.iter_mut().zip(neighbours).filter(|(_, other)| **other != NONE) {
+        parallel::each_by(ROWS, entries, |node, row| {
+            for (entry, &other) in row.iter_mut().zip(&neighbours[node]).filter(|(_, other)| **other != NONE) {
                 for (i, j) in (0..D).flat_map(|i| (0..D).map(move |j| (i, j))) {
                     if held[node * D + i] || held[other as usize * D + j] {
                         entry[(i, j)] = 0.0;
                     }
                 }
             }
-        }
+        });
     }
 
     /// The inverse diagonal blocks of Eᵀ K E, with the identity at values that are no unknowns.
@@ -236,16 +264,19 @@ impl<const D: usize> Level<D> {
         for (outer, follows, leaders) in self.followers.rows() {
             leaders.for_each(|(leader, weight)| of_leader[leader].push((outer, follows, weight)));
         }
-        for (leader, own) in of_leader.into_iter().enumerate().filter(|(_, own)| !own.is_empty()) {
-            let all: Vec<_> = own.into_iter().chain([(leader, [true; D], 1.0)]).collect();
-            blocks[leader] = Tensor::zeros();
+        parallel::each_by(ROWS, &mut blocks, |leader, block| {
+            if of_leader[leader].is_empty() {
+                return;
+            }
+            let all: Vec<_> = of_leader[leader].iter().copied().chain([(leader, [true; D], 1.0)]).collect();
+            *block = Tensor::zeros();
             for &(a, of_a, weight_a) in &all {
                 for &(b, of_b, weight_b) in &all {
                     let entry = self.entry(&next.nodes, a, b) * (weight_a * weight_b);
-                    blocks[leader] += Tensor::from_fn(|i, j| if of_a[i] && of_b[j] { entry[(i, j)] } else { 0.0 });
+                    *block += Tensor::from_fn(|i, j| if of_a[i] && of_b[j] { entry[(i, j)] } else { 0.0 });
                 }
             }
-        }
+        });
         for (k, _) in next.fixed().iter().enumerate().filter(|(_, fixed)| **fixed) {
             let (block, i) = (&mut blocks[k / D], k % D);
             block.row_mut(i).fill(0.0);
@@ -253,7 +284,9 @@ impl<const D: usize> Level<D> {
             block[(i, i)] = 1.0;
         }
         let finite = |inverse: &Tensor<f64, D>| inverse.iter().all(|x| x.is_finite());
-        self.inverse = blocks.iter().map(|block| Some(inverse(block)).filter(finite).unwrap_or(identity())).collect();
+        self.inverse = parallel::values_by(ROWS, blocks.len(), |node| {
+            Some(inverse(&blocks[node])).filter(finite).unwrap_or(identity())
+        });
     }
 
     /// K x
@@ -319,7 +352,7 @@ impl<const D: usize> Coarse<Pool> for Level<D> {
         let mut out = self.interpolation.restrict::<D>(&self.fixed_finer, bytemuck::cast_slice(r));
         self.followers.restrict::<f64>(&mut out);
         let mut out: Vec<f64> = bytemuck::allocation::cast_vec(out);
-        out.iter_mut().zip(&self.held).filter(|(_, held)| **held).for_each(|(out, _)| *out = 0.0);
+        self.clear_held(&mut out);
         out.into()
     }
 
