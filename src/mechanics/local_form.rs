@@ -45,7 +45,7 @@ impl<const D: usize> Tangent<'_, D> {
                 sums.iter_mut().zip(&moduli[group][slot * tiles..]).for_each(|(sum, one)| *sum += one);
             }
         });
-        // To free so many small arrays takes as long as to fill them.
+        // All cores free these many small arrays.
         parallel::each_by(GROUPS, &mut moduli, |_, moduli| *moduli = Vec::new());
         form
     }

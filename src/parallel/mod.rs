@@ -231,7 +231,7 @@ pub(crate) fn rows<X: Send>(x: &mut [X], width: usize, f: impl Fn(usize, &mut [X
     });
 }
 
-/// What `f(0, list)`, …, `f(count − 1, list)` append to a list, in this order, with `size` calls in a task.
+/// The list to which `f(0, list)`, …, `f(count − 1, list)` append in this order. A task makes `size` of the calls.
 #[track_caller]
 pub(crate) fn list_by<R: Send>(size: usize, count: usize, f: impl Fn(usize, &mut Vec<R>) + Sync) -> Vec<R> {
     let of_part = |part: Range<usize>| {

@@ -121,7 +121,7 @@ impl Vectors for Pool {
     }
 
     fn copy(&self, x: &[f64], y: &mut [f64]) {
-        update(x, y, |x, _| x);
+        parallel::copy(x, y);
     }
 
     fn dot(&self, x: &[f64], y: &[f64]) -> f64 {

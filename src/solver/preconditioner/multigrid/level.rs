@@ -21,8 +21,9 @@ use std::borrow::Cow;
 const MIDDLE: usize = 13;
 /// Rows in one part of the work of a thread.
 const ROWS: usize = 128;
-/// Cells whose matrices are in memory at once: this part of all, within these bounds.
+/// The cells are taken in so many batches. The matrices of one batch are in memory at a time.
 const BATCHES: usize = 16;
+/// The least and the most cells in a batch.
 const CELLS: [usize; 2] = [512, 1 << 14];
 /// The distance of a point of Gauss from the middle of an interval of length ½: 1/(4 √3).
 const GAUSS: f64 = 0.144_337_567_297_406_43;
@@ -221,6 +222,7 @@ impl<const D: usize> Level<D> {
         }
     }
 
+    /// Sets held values to zero.
     fn clear_held(&self, x: &mut [f64]) {
         parallel::zip(x, &self.held, |x, held| *x = if *held { 0.0 } else { *x });
     }
