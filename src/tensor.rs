@@ -194,6 +194,16 @@ pub(crate) fn second_invariant<T: Real, const D: usize>(a: &Tensor<T, D>) -> T {
     sum
 }
 
+/// det(I + H) − 1, as a sum that loses no digits of a small H.
+#[inline(always)]
+pub(crate) fn change_of_volume<T: Real, const D: usize>(h: &Tensor<T, D>) -> T {
+    match D {
+        1 => h[(0, 0)],
+        2 => trace(h) + determinant(h),
+        _ => trace(h) + second_invariant(h) + determinant(h),
+    }
+}
+
 /// The deformation at a point, stored as H = F − I, with the measures the laws need.
 ///
 /// Every measure is accurate to a few rounding errors *relative to its own size*, at strains of 1e-15 as at 10.
@@ -230,11 +240,7 @@ impl<T: Real, const D: usize> Deformation<T, D> {
     #[inline(always)]
     pub fn new(h: Tensor<T, D>) -> Self {
         let f = identity::<T, D>() + h;
-        let j = match D {
-            1 => h[(0, 0)],
-            2 => trace(&h) + determinant(&h),
-            _ => trace(&h) + second_invariant(&h) + determinant(&h),
-        };
+        let j = change_of_volume(&h);
         let (j, jacobian) = if D == 1 || j.value().abs() < 0.5 {
             (j, T::one() + j)
         } else {

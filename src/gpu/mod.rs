@@ -7,22 +7,26 @@
 //!
 //! The tests run the kernels on a driver that is emulated by gcc (`tests/gpu/`).
 
+mod copies;
 mod device;
 mod followers;
 mod multigrid;
 mod points;
 mod product;
 mod rows;
+mod solids;
 mod transfer;
 mod vectors;
 
+pub(crate) use copies::Copies;
 pub(crate) use device::Buffer;
 pub use device::{Gpu, GpuError};
 pub(crate) use followers::Followers;
 pub(crate) use multigrid::{Filter, Level, LevelArrays};
 pub(crate) use points::{NO_OBSTACLE, PointArrays, Points};
-pub(crate) use product::{Inertia, Masses, Product, SETS};
+pub(crate) use product::{Inertia, Masses, OfParticles, Product, SETS};
 pub(crate) use rows::{Cells, Rows};
+pub(crate) use solids::{InertiaOfParticles, SolidArrays, Solids};
 pub(crate) use transfer::{Transfer, TransferArrays};
 pub use vectors::GpuVector;
 

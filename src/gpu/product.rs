@@ -4,9 +4,9 @@ use super::device::{Buffer, GpuError, arguments};
 use super::followers::{Followers, clear_fixed};
 use super::points::{PointSums, Points};
 use super::rows::{Rows, RowsArguments};
-use super::transfer::Transfer;
+use super::transfer::{Gathers, NodalSums, PassArguments, Transfer};
 use super::vectors::GpuVector;
-use crate::parallel::held;
+use crate::parallel::{self, held};
 use std::sync::{Arc, Mutex};
 
 /// Most sets of rows of a product.
@@ -29,12 +29,99 @@ pub(crate) struct Inertia {
     pub lumping: f64,
 }
 
-/// A linearised step on a device.
+/// `Inertia` of `kernels/data.h`.
+#[derive(Clone, Copy)]
+#[repr(C)]
+pub(super) struct InertiaArguments {
+    mass: u64,
+    factor: f64,
+    consistent: f64,
+}
+
+impl InertiaArguments {
+    /// The consistent part of the inertia.
+    pub(super) fn of(inertia: Option<&Inertia>) -> Self {
+        let consistent = inertia.filter(|of| of.lumping < 1.0);
+        Self {
+            mass: consistent.map_or(0, |of| of.masses.consistent.address()),
+            factor: consistent.map_or(0.0, |of| of.factor),
+            consistent: consistent.map_or(0.0, |of| 1.0 - of.lumping),
+        }
+    }
+
+    fn exists(&self) -> bool {
+        self.mass != 0
+    }
+}
+
+/// The part of a linearised step that particles have, on a device.
 #[derive(Debug)]
-pub(crate) struct Product {
+pub(crate) struct OfParticles {
     pub transfer: Arc<Transfer>,
     pub inertia: Option<Inertia>,
     pub rows: Vec<Rows>,
+}
+
+/// `Product` of `kernels/data.h`.
+#[derive(Clone, Copy)]
+#[repr(C)]
+struct ProductArguments {
+    pass: PassArguments,
+    inertia: InertiaArguments,
+    sets: i32,
+    rows: [RowsArguments; SETS],
+}
+
+impl OfParticles {
+    fn has_pass(&self) -> bool {
+        InertiaArguments::of(self.inertia.as_ref()).exists() || !self.rows.is_empty()
+    }
+
+    /// The arguments of a pass with these rows.
+    fn arguments(&self, u: u64, of: impl Fn(&Rows) -> RowsArguments) -> ProductArguments {
+        let mut rows = [RowsArguments::default(); SETS];
+        for (to, from) in rows.iter_mut().zip(&self.rows) {
+            *to = of(from);
+        }
+        let inertia = InertiaArguments::of(self.inertia.as_ref());
+        let gathers = Gathers { values: inertia.exists(), gradients: !self.rows.is_empty(), magnitudes: false };
+        let sets = self.rows.len().min(SETS) as i32;
+        ProductArguments { pass: self.transfer.pass(u, gathers), inertia, sets, rows }
+    }
+
+    /// Adds the diagonal blocks of the particles to those at the nodes, which are stored column by column. Returns whether it did; if not,
+    /// `blocks` is as before.
+    pub(crate) fn add_diagonal_blocks(&self, blocks: &mut [f64]) -> bool {
+        let (gpu, d) = (self.transfer.gpu(), self.transfer.dimension);
+        if gpu.check_shared(self.transfer.shared_of_blocks).is_err() {
+            return false;
+        }
+        let _lock = gpu.lock();
+        let product = self.arguments(0, Rows::alone);
+        let row = |i: usize| {
+            let mut row: Vec<f64> = vec![0.0; blocks.len() / d];
+            parallel::each(&mut row, |k, entry| *entry = blocks[k / d * d * d + k % d * d + i]);
+            let (start, mut sums) = (gpu.copy_of(&row), gpu.memory_for(row.len()));
+            // `DiagonalBlocks` of `kernels/data.h`.
+            let kernels = ["diagonal_blocks_1", "diagonal_blocks_2", "diagonal_blocks_3"];
+            self.transfer.launch(kernels, self.transfer.shared_of_blocks, &arguments! { product, i: i as i32 });
+            self.transfer.add_boxes(&start, &mut sums);
+            gpu.read_at(&sums, 0, &mut row);
+            row
+        };
+        let rows: Vec<Vec<f64>> = (0..d).map(row).collect();
+        let succeeded = gpu.check().is_ok();
+        if succeeded {
+            parallel::each(blocks, |k, entry| *entry = rows[k % d][k / (d * d) * d + k / d % d]);
+        }
+        succeeded
+    }
+}
+
+/// A linearised step on a device.
+#[derive(Debug)]
+pub(crate) struct Product {
+    pub of_particles: OfParticles,
     /// Follower pressures, and contact.
     pub points: [Option<Points>; 2],
     /// Whether each value is prescribed.
@@ -47,7 +134,7 @@ pub(crate) struct Product {
 impl Product {
     /// `y = K x`
     pub(crate) fn apply(&self, x: &GpuVector, y: &mut GpuVector) {
-        let gpu = self.transfer.gpu();
+        let gpu = self.of_particles.transfer.gpu();
         let _lock = gpu.lock();
         if x.0.len().min(y.0.len()) < self.prescribed.len() {
             return gpu.keep_failure(Err(GpuError::Length {
@@ -66,48 +153,22 @@ impl Product {
 
     /// K u at all nodes. `prescribed` is the address of the mask of the values that become zero, or 0.
     fn apply_to_all(&self, u: &GpuVector, prescribed: u64, y: &mut GpuVector) {
-        let (gpu, transfer) = (self.transfer.gpu(), &*self.transfer);
-        let has_mass = self.inertia.as_ref().filter(|of| of.lumping < 1.0);
-        let passes = has_mass.is_some() || !self.rows.is_empty();
-        if passes {
-            let mut rows = [RowsArguments::default(); SETS];
-            for (to, from) in rows.iter_mut().zip(&self.rows) {
-                *to = from.arguments(transfer, u);
-            }
-            // `Product` of `kernels/data.h`.
-            let arguments = arguments! {
-                transfer: transfer.arguments(),
-                u: u.address(),
-                boxes: transfer.boxes.address(),
-                mass: has_mass.map_or(0, |of| of.masses.consistent.address()),
-                mass_factor: has_mass.map_or(0.0, |of| of.factor),
-                consistent: has_mass.map_or(0.0, |of| 1.0 - of.lumping),
-                sets: self.rows.len().min(SETS) as i32,
-                together: transfer.window.together(transfer.dimension) as i32,
-                window_rows: transfer.window.rows as i32,
-                window_nodes: transfer.window.nodes as i32,
-                rows,
-            };
-            let kernel = ["product_1", "product_2", "product_3"][transfer.dimension - 1];
-            gpu.launch(kernel, transfer.blocks, transfer.shared, &arguments);
+        let (transfer, inertia) = (&*self.of_particles.transfer, &self.of_particles.inertia);
+        let has_pass = self.of_particles.has_pass();
+        if has_pass {
+            let arguments = self.of_particles.arguments(u.address(), |rows| rows.arguments(transfer, u));
+            transfer.launch(["product_1", "product_2", "product_3"], transfer.shared, &arguments);
         }
-        let [entry_first, entries] = [9, 10].map(|k| transfer.arrays[k].address());
-        let n = transfer.nodal * transfer.dimension;
         let none = PointSums::default();
-        // `Nodes` of `kernels/data.h`.
-        let arguments = arguments! {
-            entry_first,
-            entries,
-            boxes: if passes { transfer.boxes.address() } else { 0 },
-            lumped: self.inertia.as_ref().map_or(0, |of| of.masses.lumped.address()),
-            lumped_factor: self.inertia.as_ref().map_or(0.0, |of| of.factor * of.lumping),
+        let sums = NodalSums {
+            boxes: if has_pass { transfer.boxes() } else { 0 },
+            start: 0,
+            lumped: inertia.as_ref().map_or(0, |of| of.masses.lumped.address()),
+            lumped_factor: inertia.as_ref().map_or(0.0, |of| of.factor * of.lumping),
             u: u.address(),
             prescribed,
-            points: self.points.each_ref().map(|points| points.as_ref().map_or(none, |points| points.forces(gpu, u))),
-            y: y.address(),
-            n: n as i64,
-            dimension: transfer.dimension as i32,
+            points: self.points.each_ref().map(|of| of.as_ref().map_or(none, |of| of.forces(transfer.gpu(), u))),
         };
-        gpu.launch_for("add_boxes", n, &arguments);
+        transfer.sum_at_nodes(sums, y.address());
     }
 }

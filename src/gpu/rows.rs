@@ -35,10 +35,16 @@ pub(crate) struct Cells {
 }
 
 impl Rows {
+    /// The arguments of these rows without the pressures of averaged cells.
+    pub(super) fn alone(&self) -> RowsArguments {
+        let (rows, form, count) = (self.rows.address(), self.form, self.count as i32);
+        RowsArguments { rows, factor: self.factor, form, count, ..RowsArguments::default() }
+    }
+
     /// Computes the changes of pressure of averaged cells by a nodal field, and returns the arguments of these rows.
     pub(super) fn arguments(&self, transfer: &Transfer, u: &GpuVector) -> RowsArguments {
-        let (rows, form, count) = (self.rows.address(), self.form, self.count as i32);
-        let alone = RowsArguments { rows, factor: self.factor, form, count, ..RowsArguments::default() };
+        let alone = self.alone();
+        let RowsArguments { rows, count, .. } = alone;
         let Some(cells) = &self.cells else { return alone };
         // `Volumes` of `kernels/data.h`.
         let volumes = arguments! {
@@ -49,8 +55,7 @@ impl Rows {
             count,
             first_of_b: cells.first_of_b as i32,
         };
-        let kernel = ["volumes_1", "volumes_2", "volumes_3"][transfer.dimension - 1];
-        transfer.gpu().launch(kernel, transfer.blocks, transfer.shared, &volumes);
+        transfer.launch(["volumes_1", "volumes_2", "volumes_3"], transfer.shared, &volumes);
         let [first, members] = cells.members.each_ref().map(Buffer::address);
         let n = cells.stiffness.len();
         // `Cells` of `kernels/points.h`.

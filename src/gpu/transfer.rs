@@ -1,6 +1,7 @@
 //! The shape functions of all particles on a device (`Transfer` of `kernels/data.h`).
 
-use super::device::{Buffer, Gpu, THREADS};
+use super::device::{Buffer, Gpu, THREADS, arguments};
+use super::points::PointSums;
 use crate::lanes::LANES;
 use crate::lists::Lists;
 use std::sync::Arc;
@@ -56,8 +57,12 @@ impl TransferArrays {
     /// Bytes of shared memory of a thread block: two boxes, the numbers of its particles, the windows of its groups, and the rows of the groups
     /// that are summed at a time.
     pub(crate) fn shared(&self) -> usize {
+        self.shared_with(self.dimension * (1 + self.dimension))
+    }
+
+    /// [`Self::shared`] with so many numbers of a particle.
+    fn shared_with(&self, numbers: usize) -> usize {
         let largest = self.box_first.windows(2).map(|bounds| bounds[1] - bounds[0]).max().unwrap_or(0) as usize;
-        let numbers = self.dimension * (1 + self.dimension);
         let staged = self.dimension * self.largest_window().together(self.dimension) * self.largest_window().nodes;
         size_of::<f64>() * (2 * self.dimension * largest + numbers * THREADS + staged) + THREADS / LANES * WINDOW
     }
@@ -75,14 +80,14 @@ impl TransferArrays {
 
 /// The most rows along x and nodes of a window.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct LargestWindow {
-    pub(super) rows: usize,
-    pub(super) nodes: usize,
+struct LargestWindow {
+    rows: usize,
+    nodes: usize,
 }
 
 impl LargestWindow {
     /// Groups of particles whose rows are summed at a time.
-    pub(super) fn together(self, dimension: usize) -> usize {
+    fn together(self, dimension: usize) -> usize {
         (STAGED / (self.nodes * dimension * size_of::<f64>())).clamp(1, THREADS / LANES)
     }
 }
@@ -92,14 +97,52 @@ impl LargestWindow {
 pub(crate) struct Transfer {
     gpu: Arc<Gpu>,
     pub(super) dimension: usize,
-    pub(super) blocks: usize,
+    blocks: usize,
     pub(super) nodal: usize,
+    /// Bytes of shared memory of a thread block in most passes, and in that of diagonal blocks.
     pub(super) shared: usize,
-    pub(super) window: LargestWindow,
+    pub(super) shared_of_blocks: usize,
+    window: LargestWindow,
     /// The arrays of [`TransferArrays`], then the entries of the nodes.
-    pub(super) arrays: [Buffer<u32>; 11],
+    arrays: [Buffer<u32>; 11],
     weights: Buffer<f64>,
-    pub(super) boxes: Buffer<f64>,
+    boxes: Buffer<f64>,
+}
+
+/// What a pass gathers and scatters: values, gradients, and whether weights are taken by their magnitudes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Gathers {
+    pub(super) values: bool,
+    pub(super) gradients: bool,
+    pub(super) magnitudes: bool,
+}
+
+/// `Pass` of `kernels/data.h`.
+#[derive(Clone, Copy)]
+#[repr(C)]
+pub(super) struct PassArguments {
+    transfer: TransferArguments,
+    u: u64,
+    boxes: u64,
+    together: i32,
+    window_rows: i32,
+    window_nodes: i32,
+    values: i32,
+    gradients: i32,
+    magnitudes: i32,
+}
+
+/// `NodalSums` of `kernels/data.h`: addresses of the contributions at the nodes, 0 for none.
+#[derive(Clone, Copy, Default)]
+#[repr(C)]
+pub(super) struct NodalSums {
+    pub(super) boxes: u64,
+    pub(super) start: u64,
+    pub(super) lumped: u64,
+    pub(super) lumped_factor: f64,
+    pub(super) u: u64,
+    pub(super) prescribed: u64,
+    pub(super) points: [PointSums; 2],
 }
 
 /// `Transfer` of `kernels/data.h`.
@@ -152,6 +195,8 @@ impl Transfer {
             blocks: a.group_first.len().saturating_sub(1),
             nodal: a.nodal,
             shared: a.shared(),
+            // Those of all pairs of axes and components, and the mass.
+            shared_of_blocks: a.shared_with(a.dimension * a.dimension * (a.dimension + 1) / 2 + 1),
             window: a.largest_window(),
             arrays: lists.map(|list| gpu.copy_of(list)),
             weights: on_device,
@@ -163,6 +208,46 @@ impl Transfer {
     /// The device.
     pub(crate) fn gpu(&self) -> &Arc<Gpu> {
         &self.gpu
+    }
+
+    /// The address of the boxes of all blocks.
+    pub(super) fn boxes(&self) -> u64 {
+        self.boxes.address()
+    }
+
+    /// The arguments of a pass that gathers a nodal field from the address `u`.
+    pub(super) fn pass(&self, u: u64, gathers: Gathers) -> PassArguments {
+        PassArguments {
+            transfer: self.arguments(),
+            u,
+            boxes: self.boxes.address(),
+            together: self.window.together(self.dimension) as i32,
+            window_rows: self.window.rows as i32,
+            window_nodes: self.window.nodes as i32,
+            values: gathers.values.into(),
+            gradients: gathers.gradients.into(),
+            magnitudes: gathers.magnitudes.into(),
+        }
+    }
+
+    /// Launches one of the kernels for one, two and three dimensions, a thread block for each block of cells.
+    pub(super) fn launch<T: Copy>(&self, kernels: [&'static str; 3], shared: usize, arguments: &T) {
+        self.gpu.launch(kernels[self.dimension - 1], self.blocks, shared, arguments);
+    }
+
+    /// `out = start +` the boxes of all blocks.
+    pub(super) fn add_boxes(&self, start: &Buffer<f64>, out: &mut Buffer<f64>) {
+        let boxes = NodalSums { boxes: self.boxes.address(), start: start.address(), ..NodalSums::default() };
+        self.sum_at_nodes(boxes, out.address());
+    }
+
+    /// Sums the contributions at the nodes to the address `y`.
+    pub(super) fn sum_at_nodes(&self, sums: NodalSums, y: u64) {
+        let [entry_first, entries] = [9, 10].map(|k| self.arrays[k].address());
+        let n = self.nodal * self.dimension;
+        // `Nodes` of `kernels/data.h`.
+        let arguments = arguments! { entry_first, entries, sums, y, n: n as i64, dimension: self.dimension as i32 };
+        self.gpu.launch_for("add_boxes", n, &arguments);
     }
 
     pub(super) fn arguments(&self) -> TransferArguments {

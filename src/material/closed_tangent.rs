@@ -1,6 +1,7 @@
 //! The linearised tangent in closed form, from a handful of numbers, for isotropic laws without internal variables.
 
 use crate::lanes::Lane;
+use crate::scalar::Real;
 use crate::tensor::{Tensor, Vector, identity, outer, scaled};
 
 /// V₀ δP F_rᵀ = L B + κ (A:L) A − q A Lᵀ A + b L c, with L = Σ u ⊗ ∇_r N. B, b and c are symmetric.
@@ -111,7 +112,7 @@ impl<N, const D: usize> ClosedTangent<N, D> {
 
 /// A tensor by rows.
 #[inline(always)]
-pub(super) fn rows<const D: usize>(a: &Tensor<f64, D>) -> [[f64; D]; D] {
+pub(super) fn rows<T: Real, const D: usize>(a: &Tensor<T, D>) -> [[T; D]; D] {
     a.transpose().data.0
 }
 

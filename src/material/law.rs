@@ -173,12 +173,12 @@ pub trait Law: Send + Sync {
     /// assert!((closed.apply(&l) - delta).norm() < 1e-14 * delta.norm());
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    fn closed<const D: usize>(
+    fn closed<T: Real, const D: usize>(
         &self,
-        _f_r: &Tensor<f64, D>,
-        _at: &MaterialState<f64, D>,
-        _volume: f64,
-    ) -> Option<ClosedTangent<f64, D>> {
+        _f_r: &Tensor<T, D>,
+        _at: &MaterialState<T, D>,
+        _volume: T,
+    ) -> Option<ClosedTangent<T, D>> {
         None
     }
 

@@ -10,6 +10,7 @@ mod closed_tangent;
 mod drucker_prager;
 mod fibres;
 mod foreign;
+mod formula;
 mod from_energy;
 mod hardening;
 mod hencky;
@@ -36,6 +37,7 @@ pub use fibres::{FibreReinforced, FibreReinforcedParameters};
 pub use foreign::{
     CLawParameters, Foreign, InternalVariables, MfrontParameters, TangentOf, UmatParameters, allow_library,
 };
+pub(crate) use formula::Formula;
 pub use from_energy::{Energy, FromEnergy};
 pub use hardening::Hardening;
 pub use hencky::Radial;

@@ -115,18 +115,18 @@ impl<U: Volumetric> Law for NeoHookean<U> {
     /// V₀ [ G L b_r + ΛJ² (A:L) A − q A Lᵀ A ],  A = ΔF⁻ᵀ = F⁻ᵀ F_rᵀ: δP = G δF + ΛJ² (F⁻ᵀ:δF) F⁻ᵀ − q F⁻ᵀ δFᵀ F⁻ᵀ pushed
     /// forward to the configuration of the last grid reset.
     #[inline(always)]
-    fn closed<const D: usize>(
+    fn closed<T: Real, const D: usize>(
         &self,
-        f_r: &Tensor<f64, D>,
-        at: &MaterialState<f64, D>,
-        volume: f64,
-    ) -> Option<ClosedTangent<f64, D>> {
-        let shear = self.lame.shear;
+        f_r: &Tensor<T, D>,
+        at: &MaterialState<T, D>,
+        volume: T,
+    ) -> Option<ClosedTangent<T, D>> {
+        let shear = T::lit(self.lame.shear);
         Some(ClosedTangent {
             a: rows(&(at.inverse_transpose() * f_r.transpose())),
             right: rows(&scaled(&(f_r * f_r.transpose()), shear * volume)),
-            bulk: U::stiffness::<f64, D>(self.lame.lambda, at) * volume,
-            q: (U::stress::<f64, D>(self.lame.lambda, at) - shear) * volume,
+            bulk: U::stiffness(self.lame.lambda, at) * volume,
+            q: (U::stress(self.lame.lambda, at) - shear) * volume,
             factors: None,
         })
     }

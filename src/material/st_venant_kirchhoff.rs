@@ -65,17 +65,17 @@ impl Law for StVenantKirchhoff {
     /// V₀ [ L F_r S F_rᵀ + Λ (M:L) M + G M Lᵀ M + G b L b_r ],  M = F F_rᵀ: δF S + F [ℂ : Fᵀ δF] with δF = L F_r, pushed
     /// forward to the configuration of the last grid reset.
     #[inline(always)]
-    fn closed<const D: usize>(
+    fn closed<T: Real, const D: usize>(
         &self,
-        f_r: &Tensor<f64, D>,
-        at: &MaterialState<f64, D>,
-        volume: f64,
-    ) -> Option<ClosedTangent<f64, D>> {
-        let shear = self.lame.shear * volume;
+        f_r: &Tensor<T, D>,
+        at: &MaterialState<T, D>,
+        volume: T,
+    ) -> Option<ClosedTangent<T, D>> {
+        let shear = T::lit(self.lame.shear) * volume;
         Some(ClosedTangent {
             a: rows(&(at.f * f_r.transpose())),
             right: rows(&scaled(&(f_r * self.stress(at) * f_r.transpose()), volume)),
-            bulk: self.lame.lambda * volume,
+            bulk: T::lit(self.lame.lambda) * volume,
             q: -shear,
             factors: Some([rows(&(at.f * at.f.transpose())), rows(&scaled(&(f_r * f_r.transpose()), shear))]),
         })

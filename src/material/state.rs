@@ -30,7 +30,13 @@ impl<T: Real, const D: usize> MaterialState<'static, T, D> {
     /// The state of H = F − I without internal variables, for elastic laws. Δt = 0.
     #[inline(always)]
     pub fn new(h: Tensor<T, D>) -> Self {
-        Self { deformation: Deformation::new(h), dt: 0.0, internal: &[] }
+        Self::of(Deformation::new(h))
+    }
+
+    /// The state of a deformation.
+    #[inline(always)]
+    pub(crate) fn of(deformation: Deformation<T, D>) -> Self {
+        Self { deformation, dt: 0.0, internal: &[] }
     }
 }
 

@@ -43,11 +43,11 @@ macro_rules! law_of_variants {
                 f_r: &$crate::tensor::Tensor<f64, D>,
                 at: &$crate::material::MaterialState<f64, D>
             ) -> $crate::material::TangentBlocks<D>;
-            fn closed[const D: usize](
-                f_r: &$crate::tensor::Tensor<f64, D>,
-                at: &$crate::material::MaterialState<f64, D>,
-                volume: f64
-            ) -> Option<$crate::material::ClosedTangent<f64, D>>;
+            fn closed[T: $crate::scalar::Real, const D: usize](
+                f_r: &$crate::tensor::Tensor<T, D>,
+                at: &$crate::material::MaterialState<T, D>,
+                volume: T
+            ) -> Option<$crate::material::ClosedTangent<T, D>>;
             fn volumetric[T: $crate::scalar::Real](
                 at: &$crate::tensor::Deformation<T, 1>
             ) -> Option<$crate::material::VolumeResponse<T>>;

@@ -49,7 +49,7 @@ impl Volumetric for Ciarlet {
     /// Λ/2 (J²−1)
     #[inline(always)]
     fn stress<T: Real, const D: usize>(lambda: f64, at: &Deformation<T, D>) -> T {
-        T::lit(0.5 * lambda) * at.jacobian_squared_minus_one()
+        T::lit(0.5) * T::lit(lambda) * at.jacobian_squared_minus_one()
     }
 
     /// ΛJ²

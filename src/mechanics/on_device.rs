@@ -1,7 +1,11 @@
-//! The linearised step on a device: its arrays are copied there, and its product runs there.
+//! A step on a device: its arrays are copied there. Its product runs there, and also its residual and its linearisation if the laws are
+//! formulas.
 
+use super::constitutive::Laws;
+use super::sweep::Connectivity;
 use super::tangent::Tangent;
-use crate::gpu::{self, Gpu, GpuVector, Inertia, Product, Transfer};
+use crate::gpu::{self, Gpu, GpuVector, Inertia, OfParticles, Product, Solids, Transfer};
+use crate::material::{Formula, Law};
 use crate::solver::{LinearOperator, OnDevice};
 use crate::space::vector::Vectors;
 use crate::tensor::Vector;
@@ -18,7 +22,7 @@ impl LinearOperator<GpuVector> for DeviceTangent {
 
 impl OnDevice for DeviceTangent {
     fn gpu(&self) -> &Arc<Gpu> {
-        self.0.transfer.gpu()
+        self.0.of_particles.transfer.gpu()
     }
 }
 
@@ -32,8 +36,8 @@ impl<const D: usize> Tangent<'_, D> {
         out.copy_from_slice(bytemuck::cast_slice(&gpu.numbers(&y)));
     }
 
-    /// The tangent on the device of its shape functions, if they have one.
-    pub(super) fn device_tangent(&self) -> Option<DeviceTangent> {
+    /// The tangents and masses of the particles on the device of their shape functions, if they have one.
+    pub(super) fn particles_on_device(&self) -> Option<OfParticles> {
         let transfer: Arc<Transfer> = self.connectivity().on_device()?.clone();
         if self.data.stresses.len() + self.data.cells.len() > gpu::SETS {
             return None;
@@ -43,12 +47,18 @@ impl<const D: usize> Tangent<'_, D> {
             let masses = self.connectivity().masses_on_device(&gpu, |p| mass.particles.mass[p], mass.lumped);
             Inertia { masses, factor, lumping: mass.lumping }
         });
+        Some(OfParticles { inertia, rows: self.data.rows_on_device(&gpu, self.connectivity()), transfer })
+    }
+
+    /// The tangent on the device of its shape functions, if they have one.
+    pub(super) fn device_tangent(&self) -> Option<DeviceTangent> {
+        let of_particles = self.particles_on_device()?;
+        let gpu = of_particles.transfer.gpu().clone();
         let prescribed: Vec<u8> = self.space.prescribed_mask().into_iter().map(u8::from).collect();
         let followers = self.space.followers().on_device(&gpu);
         let extended = if followers.is_some() { prescribed.len() } else { 0 };
         Some(DeviceTangent(Product {
-            inertia,
-            rows: self.data.rows_on_device(&gpu, self.connectivity()),
+            of_particles,
             points: [
                 self.data.pressures.on_device(&gpu, self.connectivity()),
                 self.data.contacts.on_device(&gpu, self.connectivity().nodes()),
@@ -56,7 +66,29 @@ impl<const D: usize> Tangent<'_, D> {
             prescribed: gpu.copy_of(&prescribed),
             followers,
             extended: Mutex::new(GpuVector(gpu.memory_for(extended))),
-            transfer,
         }))
+    }
+}
+
+impl<const D: usize, L: Law> Laws<'_, D, L> {
+    /// The laws as formulas; `None` if the stress of a body is not a formula.
+    pub(crate) fn formulas(&self) -> Option<Vec<Formula>> {
+        if self.discrete_gradient {
+            return None;
+        }
+        self.bodies.iter().map(|body| Formula::of(&body.law)).collect()
+    }
+
+    /// The particles with their laws on the device of their shape functions, if all laws are formulas.
+    pub(super) fn on_device(&self, connectivity: &Connectivity<D>) -> Option<(Arc<Transfer>, Arc<Solids>)> {
+        let (transfer, formulas) = (connectivity.on_device()?, self.formulas()?);
+        let (particles, reference) = (self.particles, self.particles.reference());
+        let state = |p: usize, k: usize| {
+            let h_r = &reference.displacement_gradient[p];
+            if k < D * D { h_r[(k / D, k % D)] } else { particles.volume[p] }
+        };
+        let (laws, constants) = formulas.iter().map(|formula| (formula.law, formula.constants)).unzip();
+        let solids = connectivity.solids_on_device(transfer, state, |p| particles.body[p], laws, constants);
+        Some((transfer.clone(), solids))
     }
 }

@@ -138,6 +138,10 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
         points.retain(|(mode, _)| !magnitude || mode.gradient);
         let (modes, all): (Vec<_>, Vec<_>) = points.into_iter().unzip();
         if let Some(mode) = modes.into_iter().reduce(Mode::and) {
+            if part == Part::Whole && self.add_on_device(&picked, magnitude, phi, out) {
+                self.restrict(magnitude, out);
+                return Ok(());
+            }
             let (connectivity, failure) = (self.step.connectivity, First::none());
             connectivity.sweep(Some(phi), Mode { weights, ..mode }, out, |group, at, sums| {
                 let added = all.iter().try_for_each(|add| add(group, at, sums));
@@ -150,11 +154,32 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
             });
             failure.check(connectivity.processes())?;
         }
-        match magnitude {
+        self.restrict(magnitude, out);
+        Ok(())
+    }
+
+    /// Adds the contributions at the particles, or their magnitudes, on the device. Returns whether it did; if not, `out` is as before.
+    fn add_on_device<T: Number>(
+        &self,
+        picked: impl Fn(&str, Role) -> bool,
+        magnitudes: bool,
+        phi: &[Vector<T, D>],
+        out: &mut [Vector<T, D>],
+    ) -> bool {
+        let mut is_added = false;
+        // Dual numbers have two fields.
+        if T::FIELDS == 1 && self.step.connectivity.on_device().is_some() {
+            T::add_flat(out, |out| is_added = self.terms.add_on_device(picked, magnitudes, &T::flat(phi), out));
+        }
+        is_added
+    }
+
+    /// R̂ = Eᵀ R, or its magnitudes.
+    fn restrict<T: Number>(&self, magnitudes: bool, out: &mut [Vector<T, D>]) {
+        match magnitudes {
             true => self.space.followers().restrict_magnitudes(out),
             false => self.space.followers().restrict(out),
         }
-        Ok(())
     }
 
     /// The external nodal forces at φ.

@@ -88,7 +88,11 @@ impl<'a, const D: usize> Tangent<'a, D> {
         self.data.add_blocks_of_functions(&functions, &mut blocks);
         if self.data.has_quadratic(&self.mass) {
             let quadratic = |group: Group<'_>, form: &mut Quadratic| self.data.add_quadratic(&self.mass, group, form);
-            self.connectivity().blocks(&mut blocks, &quadratic);
+            let on_device = self.particles_on_device();
+            if !on_device.is_some_and(|particles| particles.add_diagonal_blocks(bytemuck::cast_slice_mut(&mut blocks)))
+            {
+                self.connectivity().blocks(&mut blocks, &quadratic);
+            }
             self.add_followers(&quadratic, &mut blocks);
         }
         self.space.finish_blocks(&mut blocks);

@@ -4,7 +4,7 @@ use super::arrays::NUMBER;
 use crate::approximation::ShapeFunction;
 use crate::gpu::{Gpu, GpuError};
 use crate::lanes::LANES;
-use crate::material::Law;
+use crate::material::{Formula, Law};
 use crate::mechanics::sweep::ShapeFunctionError;
 use crate::mechanics::tangent::tangent_bytes;
 use crate::mechanics::terms::dilatation_rows;
@@ -19,6 +19,8 @@ pub struct DeviceUse {
     pub bytes: usize,
     /// Bytes that the threads of a block share.
     pub shared: usize,
+    /// Bytes of the linearised laws that are sent to the device in each Newton iteration; 0 if the laws are evaluated there.
+    pub sent: usize,
 }
 
 impl DeviceUse {
@@ -39,6 +41,11 @@ impl DeviceUse {
         let has_inertia = settings.scheme.has_inertia();
         let damps = has_inertia && simulation.loads.damping.is_some_and(|damping| damping.stiffness > 0.0);
         let sets = if damps { 2 } else { 1 };
+        let are_formulas = !mean_stress && simulation.bodies.iter().all(|body| Formula::of(&body.law).is_some());
+        // H_r, V₀ and the body of each particle, and φ̂ for a consistent mass.
+        let predicted = if has_inertia && settings.lumping < 1.0 { by_lane * D } else { 0 };
+        let solids = if are_formulas { by_lane * (D * D + 1) + by_lane / 2 + predicted } else { 0 };
+        let sent = if are_formulas { 0 } else { laws } + cells;
         let masses = if has_inertia { by_lane + nodes * NUMBER } else { 0 };
         let multigrid = simulation.preconditioner().0 == Preconditioning::Multigrid;
         let vectors = match simulation.krylov().0 {
@@ -56,8 +63,8 @@ impl DeviceUse {
         // The mask of prescribed values, diagonal blocks, and vectors.
         let nodal = nodes * D * (1 + D * NUMBER + NUMBER * vectors);
         let [functions, shared] = connectivity.device_bytes();
-        let bytes = functions + sets * (laws + cells) + masses + levels + filter + followers + nodal;
-        Ok(Self { bytes, shared })
+        let bytes = functions + sets * (laws + cells) + solids + masses + levels + filter + followers + nodal;
+        Ok(Self { bytes, shared, sent })
     }
 
     /// Whether the linear systems fit on a device. Returns the free bytes of its memory.
@@ -65,7 +72,7 @@ impl DeviceUse {
     /// # Errors
     /// They do not fit.
     pub(crate) fn check_fits(self, gpu: &Gpu) -> Result<usize, GpuError> {
-        let Self { bytes, shared } = self;
+        let Self { bytes, shared, .. } = self;
         gpu.check_shared(shared)?;
         let (free, total) = gpu.memory().ok_or_else(|| GpuError::NoDevice("its memory is unknown".to_owned()))?;
         if bytes <= free { Ok(free) } else { Err(GpuError::Memory { bytes, free, total }) }

@@ -87,8 +87,12 @@ impl SceneArguments {
         let gpu = simulation.use_gpu().map_err(Failure::scene)?;
         let needed = DeviceUse::of(simulation).map_err(|error| self.unusable(error))?;
         let free = needed.check_fits(&gpu).map_err(Failure::scene)?;
-        let [needed, free] = [needed.bytes, free].map(|bytes| BinaryBytes(bytes as u64));
-        Ok(format!("{needed} on {}, where {free} are free", gpu.name()))
+        let [bytes, free, sent] = [needed.bytes, free, needed.sent].map(|bytes| BinaryBytes(bytes as u64));
+        let laws = match needed.sent {
+            0 => "laws are evaluated there, too".to_owned(),
+            _ => format!("laws are evaluated on the processor, which sends {sent} in each Newton iteration"),
+        };
+        Ok(format!("{bytes} on {}, where {free} are free; {laws}", gpu.name()))
     }
 
     /// Runs `bfree check`: prints the particles, plan, output and probes of the scene.

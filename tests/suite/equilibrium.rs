@@ -81,13 +81,13 @@ impl Law for Faulty {
         density * self.factor(Fault::Density)
     }
 
-    fn closed<const D: usize>(
+    fn closed<T: Real, const D: usize>(
         &self,
-        f_n: &Tensor<f64, D>,
-        at: &MaterialState<f64, D>,
-        volume: f64,
-    ) -> Option<ClosedTangent<f64, D>> {
-        let closed = self.law.closed(f_n, at, volume * self.factor(Fault::Closed));
+        f_n: &Tensor<T, D>,
+        at: &MaterialState<T, D>,
+        volume: T,
+    ) -> Option<ClosedTangent<T, D>> {
+        let closed = self.law.closed(f_n, at, volume * T::lit(self.factor(Fault::Closed)));
         closed.filter(|_| self.closed)
     }
 }

@@ -54,17 +54,21 @@ fn emulated(program: &Path, order: &str) -> Command {
     command
 }
 
-/// Runs this test again, in processes that find the emulated driver. Returns whether this is such a process.
-fn is_emulated(test: &str) -> bool {
+/// Runs this test again, in processes that find the emulated driver, and launch these kernels. Returns whether this is such a process.
+fn is_emulated(test: &str, kernels: &[&str]) -> bool {
     if std::env::var_os("BFREE_EMULATED").is_some() {
         return true;
     }
+    let directory = tempfile::tempdir().unwrap();
     for order in ORDERS {
+        let log = directory.path().join(order);
         let mut again = emulated(&std::env::current_exe().unwrap(), order);
-        let said = again.args([&format!("gpu::{test}"), "--exact", "--nocapture"]).env("BFREE_EMULATED", "1").output();
-        let said = said.unwrap();
+        again.args([&format!("gpu::{test}"), "--exact", "--nocapture"]).env("BFREE_EMULATED", "1");
+        let said = again.env("BFREE_GPU_LOG", &log).output().unwrap();
         let text = [said.stdout, said.stderr].map(|text| String::from_utf8_lossy(&text).into_owned()).concat();
         assert!(said.status.success() && text.contains("1 passed"), "{order}: {text}");
+        let launched = std::fs::read_to_string(&log).unwrap();
+        kernels.iter().for_each(|kernel| assert!(launched.contains(kernel), "{order}: {kernel} ran elsewhere"));
     }
     false
 }
@@ -88,31 +92,32 @@ fn run(command: &mut Command, scene: &str, out: &Path, arguments: &[&str]) -> Re
     )
 }
 
-/// Scenes that together have all parts of a linearised step, all solvers and preconditioners: name, steps, and overrides.
-const SCENES: [(&str, &str, &[&str]); 12] = [
+/// Scenes that together have all parts of a linearised step, all solvers and preconditioners: name, steps, overrides, and whether the residual runs
+/// on the device.
+const SCENES: [(&str, &str, &[&str], bool); 12] = [
     // LME, dynamics
-    ("rebound.json", "12", &[]),
+    ("rebound.json", "12", &[], true),
     // cubic functions, multigrid with its filter, nodes that follow
-    ("block_static.json", "1", &[]),
-    ("cook.json", "1", &["--set", "aggregation=true"]),
+    ("block_static.json", "1", &[], true),
+    ("cook.json", "1", &["--set", "aggregation=true"], true),
     // von Mises with averaged cells: general tangents
-    ("cook_plastic.json", "2", &[]),
-    ("compaction.json", "3", &[]),
+    ("cook_plastic.json", "2", &[], false),
+    ("compaction.json", "3", &[], true),
     // friction and obstacles
-    ("rolling.json", "4", &[]),
-    ("billiard.json", "4", &[]),
-    ("collision.json", "4", &[]),
+    ("rolling.json", "4", &[], true),
+    ("billiard.json", "4", &[], true),
+    ("collision.json", "4", &[], true),
     // contact in load steps, and a path of equilibria
-    ("wedge.json", "4", &[]),
-    ("cook.json", "2", &["--set", "time.scheme=\"arc_length\""]),
+    ("wedge.json", "4", &[], true),
+    ("cook.json", "2", &["--set", "time.scheme=\"arc_length\""], true),
     // three dimensions
-    ("ball_drop.json", "2", &[]),
-    ("riemann.json", "3", &[]),
+    ("ball_drop.json", "2", &[], true),
+    ("riemann.json", "3", &[], true),
 ];
 
 #[test]
 fn runs_on_a_gpu_have_the_bits_of_those_on_the_processor() -> Result<(), Failure> {
-    for (scene, steps, sets) in SCENES {
+    for (scene, steps, sets, has_formula) in SCENES {
         let directory = tempfile::tempdir()?;
         let [here, there] = ["here", "there"].map(|name| directory.path().join(name));
         let arguments = [&["--steps", steps], sets].concat();
@@ -127,7 +132,9 @@ fn runs_on_a_gpu_have_the_bits_of_those_on_the_processor() -> Result<(), Failure
                 let [here, there] = [&here, &there].map(|folder| std::fs::read(folder.join(name)).ok());
                 assert!(here == there, "{scene}, {order}: {name} differs");
             }
-            assert!(std::fs::read_to_string(&log)?.contains("product_"), "{scene}: the product ran elsewhere");
+            let launched = std::fs::read_to_string(&log)?;
+            assert!(launched.contains("product_"), "{scene}: the product ran elsewhere");
+            assert_eq!(launched.contains("forces_"), has_formula, "{scene}: where the residual ran");
         }
     }
     Ok(())
@@ -147,11 +154,15 @@ fn random_block(dimension: usize, case: usize) -> Value {
         json!({"neo_hookean": {"young": 100, "poisson": 0.3}}),
         json!({"mooney_rivlin": {"c1": 20, "c2": 5, "bulk": 200}}),
         json!({"ogden": {"terms": [{"modulus": 20, "exponent": 2}, {"modulus": -5, "exponent": -2}], "bulk": 200}}),
+        json!({"neo_hookean_logarithmic": {"young": 100, "poisson": 0.3}}),
+        json!({"st_venant_kirchhoff": {"young": 100, "poisson": 0.3}}),
     ];
     let of = |x: f64| vec![x; dimension];
     let is_dynamic = case % 5 != 4;
+    // St. Venant and Kirchhoff's energy has no part of the volume alone.
+    let averages = case % 4 == 1 && case % materials.len() != 4;
     let body = json!({"name": "block", "density": 2, "shape": {"box": {"min": of(0.5), "max": of(2.25)}},
-        "material": materials[case % 3], "volumetric": if case % 4 == 1 { "mean_dilatation" } else { "pointwise" }});
+        "material": materials[case % materials.len()], "volumetric": if averages { "mean_dilatation" } else { "pointwise" }});
     let mut scene = json!({"grid": {"size": of(4.0), "spacing": 0.5}, "time": {"step": 0.01, "end": 1},
         "approximation": families[case % 6], "aggregation": case % 7 > 3, "bodies": [body], "boundary": {"left": "fixed", "right": "sliding"}});
     if is_dynamic {
@@ -171,27 +182,33 @@ const fn has_pressure(case: usize) -> bool {
     case % 11 == 10
 }
 
-/// Compares the products of the next step of a scene. Particles are moved at random by up to most of a cell, so that cells hold none to many.
-fn compare_products<const D: usize>(gpu: &Arc<Gpu>, case: usize) -> Result<(), Failure> {
+/// Compares the residuals, products and diagonal blocks of the next step of a scene. Particles are moved at random by up to most of a cell, so
+/// that cells hold none to many. Some are stretched to several times their volume, and some pressed to a fraction.
+fn compare_equilibria<const D: usize>(gpu: &Arc<Gpu>, case: usize) -> Result<(), Failure> {
     let scene = random_block(D, case);
     let mut simulation = built::<D>(&scene)?;
-    simulation.settings.gpu = Some(gpu.clone());
     let particles = &mut simulation.particles;
     let spread = 0.45 * (1 + case % 2) as f64 * simulation.grid.spacing;
     let moves = direction::<D>(particles.len(), case as u64);
     particles.position.iter_mut().zip(&moves).for_each(|(x, by)| *x += by * spread);
     for (k, h) in particles.displacement_gradient.iter_mut().enumerate() {
         h.iter_mut().enumerate().for_each(|(i, h)| *h = 0.1 * moves[(k + i) % moves.len()][0]);
+        (0..D).for_each(|i| h[(i, i)] += [0.0, 0.9, 0.0, -0.45][(k + case) % 4]);
     }
-    let coming = simulation.next_step()?;
-    let (equilibrium, count) = (coming.equilibrium(), coming.nodes().len());
+    let mut there = simulation.clone();
+    there.settings.gpu = Some(gpu.clone());
+    let (here, there) = (simulation.next_step()?, there.next_step()?);
+    let (of_processor, equilibrium, count) = (here.equilibrium(), there.equilibrium(), here.nodes().len());
     let phi: Vec<_> = direction::<D>(count, 1).iter().map(|x| x * 0.01).collect();
+    assert!(of_processor.residual(&phi)? == equilibrium.residual(&phi)?, "{D}D, case {case}, residual: {scene}");
+    assert!(of_processor.magnitude(&phi)? == equilibrium.magnitude(&phi)?, "{D}D, case {case}, magnitude: {scene}");
     let mut u = direction::<D>(count, 2);
-    coming.prescribed().iter().for_each(|dof| u[dof.node][dof.component] = 0.0);
-    let tangent = equilibrium.tangent(None, &phi)?;
+    here.prescribed().iter().for_each(|dof| u[dof.node][dof.component] = 0.0);
+    let (tangent, on_gpu) = (of_processor.tangent(None, &phi)?, equilibrium.tangent(None, &phi)?);
+    assert!(*tangent.diagonal_blocks() == *on_gpu.diagonal_blocks(), "{D}D, case {case}, blocks: {scene}");
     let mut expected = vec![Vector::zeros(); count];
     tangent.product(&u, &mut expected);
-    let on_device = tangent.on_device().ok_or("no device")?;
+    let on_device = on_gpu.on_device().ok_or("no device")?;
     let (x, mut y) = (gpu.vector(&u.iter().flatten().copied().collect::<Vec<_>>()), gpu.zeros(D * count));
     on_device.apply(&x, &mut y);
     gpu.check()?;
@@ -205,24 +222,40 @@ fn compare_products<const D: usize>(gpu: &Arc<Gpu>, case: usize) -> Result<(), F
     Ok(())
 }
 
-/// Products on a processor that rounds a product and a sum once have the bits of those on a device.
+/// The kernels of an equilibrium.
+const KERNELS: [&str; 12] = [
+    "forces_1",
+    "forces_2",
+    "forces_3",
+    "linearize_1",
+    "linearize_2",
+    "linearize_3",
+    "product_1",
+    "product_2",
+    "product_3",
+    "diagonal_blocks_1",
+    "diagonal_blocks_2",
+    "diagonal_blocks_3",
+];
+
+/// Equilibria on a processor that rounds a product and a sum once have the bits of those on a device.
 #[test]
-fn products_have_the_bits_of_the_processor() -> Result<(), Failure> {
-    if !is_emulated("products_have_the_bits_of_the_processor") {
+fn equilibria_have_the_bits_of_the_processor() -> Result<(), Failure> {
+    if !is_emulated("equilibria_have_the_bits_of_the_processor", &KERNELS) {
         return Ok(());
     }
     let gpu = Arc::new(Gpu::open()?);
     for case in 0..42 {
-        compare_products::<1>(&gpu, case)?;
-        compare_products::<2>(&gpu, case)?;
-        compare_products::<3>(&gpu, case)?;
+        compare_equilibria::<1>(&gpu, case)?;
+        compare_equilibria::<2>(&gpu, case)?;
+        compare_equilibria::<3>(&gpu, case)?;
     }
     Ok(())
 }
 
 #[test]
 fn vectors_have_the_bits_of_the_processor() -> Result<(), Failure> {
-    if !is_emulated("vectors_have_the_bits_of_the_processor") {
+    if !is_emulated("vectors_have_the_bits_of_the_processor", &["dot"]) {
         return Ok(());
     }
     let (gpu, pool) = (Gpu::open()?, bfree::pooled::Pool::default());
@@ -294,26 +327,40 @@ fn a_gpu_that_fails_loses_nothing() -> Result<(), Failure> {
     Ok(())
 }
 
-/// The check of the tangent uses the product that runs: it stops a run whose kernels have stresses that are a thousandth too large.
-#[test]
-fn the_tangent_check_sees_the_product_of_the_gpu() -> Result<(), Failure> {
-    let directory = tempfile::tempdir()?;
-    let (wrong, arguments) = (directory.path().join("wrong"), ["--steps", "2", "--gpu", "--check-tangent"]);
-    std::fs::create_dir(&wrong)?;
+/// The kernels with one fault, compiled in a folder.
+fn compile_with_fault(right: &str, wrong: &str, folder: &Path) -> Result<(), Failure> {
+    std::fs::create_dir(folder)?;
+    let mut is_there = false;
     for entry in std::fs::read_dir(kernels())? {
         let path = entry?.path();
-        let text =
-            std::fs::read_to_string(&path)?.replace("double one = stress[i][k];", "double one = 1.001 * stress[i][k];");
-        std::fs::write(wrong.join(path.file_name().ok_or("a file without a name")?), text)?;
+        let text = std::fs::read_to_string(&path)?;
+        is_there |= text.contains(right);
+        std::fs::write(folder.join(path.file_name().ok_or("a file without a name")?), text.replace(right, wrong))?;
     }
-    compile(&wrong, &wrong);
+    assert!(is_there, "the kernels have no line {right}");
+    compile(folder, folder);
+    Ok(())
+}
+
+/// The check of the tangent uses the product that runs: it stops a run whose kernels have stresses or tangents that are a thousandth too large.
+#[test]
+fn the_tangent_check_sees_the_product_of_the_gpu() -> Result<(), Failure> {
+    let (directory, arguments) = (tempfile::tempdir()?, ["--steps", "2", "--gpu", "--check-tangent"]);
     let mut right = emulated(bfree(), "forward");
     let said = run(&mut right, "rebound.json", &directory.path().join("right"), &arguments)?;
     assert_eq!(said.0, Some(0), "{}", said.2);
-    let mut faulty = emulated(bfree(), "forward");
-    faulty.env("LD_LIBRARY_PATH", &wrong);
-    let said = run(&mut faulty, "rebound.json", &directory.path().join("faulty"), &arguments)?;
-    assert!(said.0 == Some(1) && said.2.contains("the tangent is wrong"), "{}", said.2);
+    let faults = [
+        ("product", "double one = stress[i][k];", "double one = 1.001 * stress[i][k];"),
+        ("tangent", "f_r, volume, constants, rows)", "f_r, 1.001 * volume, constants, rows)"),
+    ];
+    for (name, right, wrong) in faults {
+        let [folder, out] = ["kernels", "out"].map(|end| directory.path().join(format!("{name}-{end}")));
+        compile_with_fault(right, wrong, &folder)?;
+        let mut faulty = emulated(bfree(), "forward");
+        faulty.env("LD_LIBRARY_PATH", &folder);
+        let said = run(&mut faulty, "rebound.json", &out, &arguments)?;
+        assert!(said.0 == Some(1) && said.2.contains("the tangent is wrong"), "{name}: {}", said.2);
+    }
     Ok(())
 }
 
@@ -360,7 +407,7 @@ fn compare_steps<const D: usize>(gpu: &Arc<Gpu>, scene: &Value, steps: usize) ->
 
 #[test]
 fn free_obstacles_have_the_bits_of_the_processor() -> Result<(), Failure> {
-    if !is_emulated("free_obstacles_have_the_bits_of_the_processor") {
+    if !is_emulated("free_obstacles_have_the_bits_of_the_processor", &["point_motions"]) {
         return Ok(());
     }
     let gpu = Arc::new(Gpu::open()?);

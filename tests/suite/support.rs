@@ -212,12 +212,12 @@ impl Law for Watched {
         self.law.tangent_density(at, v, b)
     }
 
-    fn closed<const D: usize>(
+    fn closed<T: Real, const D: usize>(
         &self,
-        f_n: &Tensor<f64, D>,
-        at: &MaterialState<f64, D>,
-        volume: f64,
-    ) -> Option<ClosedTangent<f64, D>> {
+        f_n: &Tensor<T, D>,
+        at: &MaterialState<T, D>,
+        volume: T,
+    ) -> Option<ClosedTangent<T, D>> {
         self.law.closed(f_n, at, volume).filter(|_| self.closed)
     }
 

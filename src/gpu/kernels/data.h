@@ -58,21 +58,96 @@ struct Rows {
     int first_of_a;
 };
 
-struct Product {
+// A pass over the particles (`pass.h`).
+struct Pass {
     struct Transfer transfer;
-    // The nodal field, and the boxes of all blocks.
+    // The nodal field that is gathered, and the boxes of all blocks, into which the particles are summed.
     const double *u;
     double *boxes;
-    // Masses of the particles by group and lane, and 1 − ε; none without inertia or with a lumped mass.
-    const double *mass;
-    double mass_factor;
-    double consistent;
-    int sets;
     // Groups whose rows are summed at a time, and the most rows and nodes of a window.
     int together;
     int window_rows;
     int window_nodes;
+    // Whether particles give q, whether they give σ, and whether all weights are taken by their magnitudes.
+    int values;
+    int gradients;
+    int magnitudes;
+};
+
+// The masses of the particles by group and lane, with a factor and 1 − ε; none without inertia or with a lumped mass.
+struct Inertia {
+    const double *mass;
+    double factor;
+    double consistent;
+};
+
+struct Product {
+    struct Pass pass;
+    struct Inertia inertia;
+    int sets;
     struct Rows rows[SETS];
+};
+
+// Row i of the diagonal blocks of a product.
+struct DiagonalBlocks {
+    struct Product product;
+    int i;
+};
+
+// The particles at the last grid reset, and the laws of their bodies, which are formulas (`material/formula.rs`).
+struct Solids {
+    // Of each group, a row of lanes each: H_r by rows, then V₀.
+    const double *states;
+    // The body of each particle by group and lane; the law of each body, and its two constants.
+    const u32 *bodies;
+    const u32 *laws;
+    const double *constants;
+    // Becomes 1 if a particle has det F ≤ 0.
+    u32 *failed;
+};
+
+// The laws.
+#define CIARLET 0
+#define LOGARITHMIC 1
+
+// J − 1 and J = m 2^k, with 2^−k and k ln 2. m is between √½ and √2.
+struct Volume {
+    double j;
+    double jacobian;
+    double scale;
+    double k_ln_2;
+    int k;
+};
+
+// The exponent of J, from the bits of J √2.
+FUNCTION void binary_exponent(struct Volume *v) {
+    union {
+        double number;
+        unsigned long long bits;
+    } of = {v->jacobian * 1.4142135623730951};
+    const int biased = (int)(of.bits >> 52);
+    of.bits = (unsigned long long)(biased < 2046 ? 2046 - biased : 0) << 52;
+    v->k = biased - 1023;
+    v->scale = of.number;
+    v->k_ln_2 = (double)v->k * 0.6931471805599453;
+}
+
+// The residual's part at the particles: stresses, and inertia.
+struct Forces {
+    struct Pass pass;
+    struct Solids solids;
+    // The masses with α₁ as the factor, and φ̂ at the particles, a row of lanes for each component of each group.
+    struct Inertia inertia;
+    const double *predicted;
+};
+
+// The laws linearised.
+struct Linearize {
+    struct Transfer transfer;
+    const double *u;
+    struct Solids solids;
+    double *rows;
+    int count;
 };
 
 // The changes of volume of the particles of averaged cells, b : L.
@@ -151,10 +226,12 @@ struct PointSums {
     const double *forces;
 };
 
-struct Nodes {
-    const u32 *entry_first;
-    const u32 *entries;
+// Contributions at the nodes.
+struct NodalSums {
+    // The boxes of all blocks; none without a pass over the particles.
     const double *boxes;
+    // Values to which the sums are added; none for zeros.
+    const double *start;
     // The lumped masses times their factor; none without inertia.
     const double *lumped;
     double lumped_factor;
@@ -163,28 +240,35 @@ struct Nodes {
     const u8 *prescribed;
     // Follower pressures, and contact.
     struct PointSums points[2];
+};
+
+struct Nodes {
+    const u32 *entry_first;
+    const u32 *entries;
+    struct NodalSums sums;
     double *y;
     i64 n;
     int dimension;
 };
 
-// y = K u at the nodes, from the lumped masses, the surface points, and the boxes of all blocks.
+// y at the nodes: the sum of all contributions.
 KERNEL(add_boxes, Nodes) {
     PHASE(t) {
         const i64 i = ITEM(t);
+        const struct NodalSums *of = &a.sums;
         if (i < a.n) {
             const i64 node = i / a.dimension, c = i % a.dimension;
-            double sum = 0.0;
-            if (a.lumped) sum += a.u[i] * (a.lumped_factor * a.lumped[node]);
+            double sum = of->start ? of->start[i] : 0.0;
+            if (of->lumped) sum += of->u[i] * (of->lumped_factor * of->lumped[node]);
             for (int s = 0; s < 2; s++) {
-                const struct PointSums *points = &a.points[s];
+                const struct PointSums *points = &of->points[s];
                 for (u32 k = points->first ? points->first[node] : 0; points->first && k < points->first[node + 1]; k++)
                     sum += points->forces[(i64)points->points[k] * a.dimension + c] * points->weights[k];
             }
-            if (a.boxes)
+            if (of->boxes)
                 for (u32 e = a.entry_first[node]; e < a.entry_first[node + 1]; e++)
-                    sum += a.boxes[(i64)a.entries[e] * a.dimension + c];
-            a.y[i] = a.prescribed && a.prescribed[i] ? 0.0 : sum;
+                    sum += of->boxes[(i64)a.entries[e] * a.dimension + c];
+            a.y[i] = of->prescribed && of->prescribed[i] ? 0.0 : sum;
         }
     }
 }

@@ -3,7 +3,7 @@
 #include "language.h"
 #include "vectors.h"
 #include "data.h"
-#include "closed.h"
+#include "recorded.h"
 #include "multigrid.h"
 #include "points.h"
 #define DIMENSION 1

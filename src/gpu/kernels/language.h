@@ -17,6 +17,7 @@
 #define THREADS 128
 
 #ifdef EMULATED
+#include <float.h>
 #include <math.h>
 extern _Thread_local unsigned emulated_block;
 extern _Thread_local double emulated_shared[];
@@ -32,6 +33,7 @@ int emulated_thread(int step);
     void name(void **arguments) { name##_of_block(*(const struct type *)arguments[0]); } \
     static void name##_of_block(const struct type a)
 #else
+#define DBL_MAX 1.7976931348623157e308
 #define FUNCTION static __device__ __forceinline__
 #define UNROLL _Pragma("unroll 16")
 #define BLOCK blockIdx.x

@@ -1,11 +1,6 @@
-// The product of the tangent with a nodal field, for one dimension DIMENSION; see `mechanics/sweep` for the words and the formulas.
-//
-// A thread block is a block of cells. In turns of 16 groups of particles,
-// 1. a thread is a particle: it gathers u and L from the box of nodes, and evaluates (q, σ);
-// 2. a thread is a row along x of the window of a group: it sums the particles of the group over the nodes of the row;
-// 3. a thread is a row of the box, and a component: it adds the rows of the groups, in their order.
-// A second kernel adds the boxes of the blocks, node by node, in the order of the blocks. So no sum depends on the order of threads, and all
-// sums have the order of the loops on the processor (`kernel.rs`), and the same bits.
+// The passes over the particles, for one dimension DIMENSION; see `mechanics/sweep` for the words and the formulas. A pass gathers from the
+// nodes, evaluates the particles, and scatters to the nodes. All sums have the order of the loops on the processor (`kernel.rs`), and the same
+// bits.
 
 #define D DIMENSION
 #define JOIN_(a, b) a##_##b
@@ -14,6 +9,8 @@
 
 // The numbers of a particle: q, then σ by rows.
 #define NUMBERS (D + D * D)
+// Pairs of axes (k, l) with k ≤ l. The pair has the index k + l (l + 1) / 2.
+#define PAIRS (D * (D + 1) / 2)
 
 // Σ u N and Σ u N' of the row of `width` nodes that begins at `nodal`. `n` and `dn` are the weights of the particle. The width is a constant in
 // all calls, so that loops over x are unrolled and arrays lie in registers.
@@ -118,9 +115,8 @@ FUNCTION void IN_D(stress)(int form, const double *rows, const double l[D][D], d
 // (q, σ) of a particle: q = m u, σ = Σ f 𝔸 : L.
 FUNCTION void IN_D(evaluate)(const struct Product *a, i64 group, int lane, const double *u, const double l[D][D],
                              double *out) {
-    for (int k = 0; k < NUMBERS; k++) out[k] = 0.0;
-    if (a->mass) {
-        double mass = a->mass_factor * (a->consistent * a->mass[group * LANES + lane]);
+    if (a->inertia.mass) {
+        double mass = a->inertia.factor * (a->inertia.consistent * a->inertia.mass[group * LANES + lane]);
         for (int c = 0; c < D; c++) out[c] += mass * u[c];
     }
     for (int s = 0; s < a->sets; s++) {
@@ -141,37 +137,162 @@ FUNCTION void IN_D(evaluate)(const struct Product *a, i64 group, int lane, const
     }
 }
 
+// A particle at L: H, F_r and the volumes of H, for its law. Where det F ≤ 0, the particle is undeformed, and the pass has failed.
+FUNCTION void IN_D(deform)(const struct Solids *a, const double *state, const double l[D][D], double h[D][D],
+                           double f_r[D][D], struct Volume *v) {
+    double h_r[D][D];
+    for (int i = 0; i < D; i++)
+        for (int k = 0; k < D; k++) {
+            h_r[i][k] = state[(i * D + k) * LANES];
+            f_r[i][k] = (i == k ? 1.0 : 0.0) + h_r[i][k];
+        }
+    IN_D(compose)(l, h_r, h);
+    IN_D(change_of_volume)(h, &v->j);
+    v->jacobian = 1.0 + v->j;
+    if (D > 1 && !(fabs(v->j) < 0.5)) {
+        IN_D(determinant)(h, &v->jacobian);
+        v->j = v->jacobian - 1.0;
+    }
+    if (!(v->jacobian > 0.0 && v->jacobian <= DBL_MAX)) {
+        *a->failed = 1;
+        v->j = 0.0;
+        v->jacobian = 1.0;
+        for (int i = 0; i < D; i++)
+            for (int k = 0; k < D; k++) h[i][k] = 0.0;
+    }
+    binary_exponent(v);
+}
+
+// Calls the formula of a law.
+#define OF_LAW(law, name, ...)                                                    \
+    switch (law) {                                                                \
+    case CIARLET: IN_D(name##_ciarlet)(__VA_ARGS__); break;                       \
+    case LOGARITHMIC:                                                             \
+        if (v.k == 0) IN_D(name##_logarithmic)(__VA_ARGS__);                      \
+        else IN_D(name##_logarithmic_far)(__VA_ARGS__);                           \
+        break;                                                                    \
+    default: IN_D(name##_st_venant_kirchhoff)(__VA_ARGS__);                       \
+    }
+
+// (q, σ) of a particle in the residual: q = α₁ m (φ − φ̂), σ = V₀ F S F_rᵀ; or with the magnitude of σ.
+FUNCTION void IN_D(force)(const struct Forces *a, i64 group, int lane, const double *phi, const double l[D][D],
+                          double *out) {
+    if (a->inertia.mass) {
+        const double mass = a->inertia.factor * (a->inertia.consistent * a->inertia.mass[group * LANES + lane]);
+        for (int c = 0; c < D; c++) out[c] += mass * (phi[c] - a->predicted[(group * D + c) * LANES + lane]);
+    }
+    const double *state = a->solids.states + group * (D * D + 1) * LANES + lane, volume = state[D * D * LANES];
+    const u32 body = a->solids.bodies[group * LANES + lane];
+    const double *constants = a->solids.constants + 2 * body;
+    double h[D][D], f_r[D][D], stress[D][D];
+    struct Volume v;
+    IN_D(deform)(&a->solids, state, l, h, f_r, &v);
+    OF_LAW(a->solids.laws[body], stress, h, &v, f_r, volume, constants, stress)
+    for (int k = 0; k < D * D; k++) {
+        out[D + k] += stress[k / D][k % D];
+        if (a->pass.magnitudes) out[D + k] = fabs(out[D + k]);
+    }
+}
+
+// The tangent of a particle in the closed form, as rows of the lane. Rows behind those of its law are zero.
+FUNCTION void IN_D(linearized)(const struct Linearize *a, i64 group, int lane, const double l[D][D]) {
+    const double *state = a->solids.states + group * (D * D + 1) * LANES + lane, volume = state[D * D * LANES];
+    const u32 body = a->solids.bodies[group * LANES + lane];
+    const double *constants = a->solids.constants + 2 * body;
+    double h[D][D], f_r[D][D], *rows = a->rows + group * a->count * LANES + lane;
+    struct Volume v;
+    IN_D(deform)(&a->solids, state, l, h, f_r, &v);
+    for (int k = D * D + PAIRS + 2; k < a->count; k++) rows[k * LANES] = 0.0;
+    OF_LAW(a->solids.laws[body], tangent, h, &v, f_r, volume, constants, rows)
+}
+
+// Row i of 𝔸_kl + 𝔸_lk for all pairs k < l, and of 𝔸_kk.
+FUNCTION void IN_D(pairs)(int form, const double *rows, int i, double out[PAIRS][D]) {
+    if (form == GENERAL) {
+        for (int l = 0; l < D; l++)
+            for (int k = 0; k <= l; k++)
+                for (int j = 0; j < D; j++) {
+                    const double one = rows[(((k * D + l) * D + i) * D + j) * LANES];
+                    out[k + l * (l + 1) / 2][j] = k == l ? one : one + rows[(((l * D + k) * D + i) * D + j) * LANES];
+                }
+        return;
+    }
+#define PAIRS_OF_ROW(I)                                  \
+    case I:                                              \
+        if (form == CLOSED) IN_D(pairs_##I)(rows, out);  \
+        else IN_D(pairs_with_factors_##I)(rows, out);    \
+        break;
+    switch (i) {
+#if D > 1
+        PAIRS_OF_ROW(1)
+#endif
+#if D > 2
+        PAIRS_OF_ROW(2)
+#endif
+    default:
+        PAIRS_OF_ROW(0)
+    }
+#undef PAIRS_OF_ROW
+}
+
+// The numbers of a particle for row i of the diagonal blocks: those of all pairs, then the mass.
+FUNCTION void IN_D(block_row)(const struct DiagonalBlocks *a, i64 group, int lane, double *out) {
+    const struct Product *product = &a->product;
+    for (int s = 0; s < product->sets; s++) {
+        const struct Rows *set = &product->rows[s];
+        double of_pairs[PAIRS][D];
+        IN_D(pairs)(set->form, set->rows + group * set->count * LANES + lane, a->i, of_pairs);
+        for (int k = 0; k < PAIRS * D; k++) out[k] = fma(set->factor, of_pairs[k / D][k % D], out[k]);
+    }
+    if (product->inertia.mass)
+        out[PAIRS * D] +=
+            product->inertia.factor * (product->inertia.consistent * product->inertia.mass[group * LANES + lane]);
+}
+
+// N of the nodes of a tile along x, and N', of one particle; or their magnitudes.
+FUNCTION void IN_D(along)(const struct Window *w, const double *weights, int start, const int width, const int magnitudes,
+                          double *n, double *dn) {
+    UNROLL for (int x = 0; x < width; x++) {
+        const double value = weights[(start + x) * LANES], slope = weights[(w->width[0] + start + x) * LANES];
+        n[x] = magnitudes ? fabs(value) : value;
+        dn[x] = magnitudes ? fabs(slope) : slope;
+    }
+}
+
+// The products of the weights of one particle across x, in the row (y, z) of its window: N_y N_z, N_y' N_z, N_y N_z'; or their magnitudes.
+FUNCTION void IN_D(across)(const struct Window *w, const double *weights, const int *at, const int magnitudes,
+                           double *products) {
+    for (int k = 0; k < D; k++) products[k] = 1.0;
+    const double *rows = weights + 2 * w->width[0] * LANES;
+    for (int axis = 1; axis < D; axis++) {
+        const double value = rows[at[axis] * LANES], slope = rows[(w->width[axis] + at[axis]) * LANES];
+        for (int k = 0; k < D; k++) products[k] = products[k] * (k == axis ? slope : value);
+        rows += 2 * w->width[axis] * LANES;
+    }
+    for (int k = 0; k < D && magnitudes; k++) products[k] = fabs(products[k]);
+}
+
 // Σ q N_I + σ ∇N_I over the particles of a group, for a tile of nodes along the row (y, z) of its window, all components.
-FUNCTION void IN_D(scatter_tile)(const struct Product *a, const struct Window *w, const double *weights,
-                                 const double *numbers, const int *at, int start, const int width, double *out) {
+FUNCTION void IN_D(scatter)(const struct Pass *a, const int magnitudes, const struct Window *w, const double *weights,
+                            const double *numbers, const int *at, int start, const int width, double *out) {
     double sums[D][WIDEST_TILE];
-    const int has_sets = a->sets > 0, has_mass = a->mass != 0;
     for (int c = 0; c < D; c++)
         UNROLL for (int x = 0; x < width; x++) sums[c][x] = 0.0;
     for (int p = 0; p < w->lanes; p++) {
         double products[D], n[WIDEST_TILE], dn[WIDEST_TILE];
-        for (int k = 0; k < D; k++) products[k] = 1.0;
-        const double *rows = weights + 2 * w->width[0] * LANES + p;
-        for (int axis = 1; axis < D; axis++) {
-            const double value = rows[at[axis] * LANES], slope = rows[(w->width[axis] + at[axis]) * LANES];
-            for (int k = 0; k < D; k++) products[k] = products[k] * (k == axis ? slope : value);
-            rows += 2 * w->width[axis] * LANES;
-        }
-        UNROLL for (int x = 0; x < width; x++) {
-            n[x] = weights[(start + x) * LANES + p];
-            dn[x] = weights[(w->width[0] + start + x) * LANES + p];
-        }
+        IN_D(across)(w, weights + p, at, magnitudes, products);
+        IN_D(along)(w, weights + p, start, width, magnitudes, n, dn);
         const double *q = numbers + p, *stress = numbers + D * LANES + p;
         for (int c = 0; c < D; c++) {
             double across = 0.0, along = 0.0;
-            if (has_sets) {
+            if (a->gradients) {
                 for (int k = 1; k < D; k++) across = fma(stress[(c * D + k) * LANES], products[k], across);
                 along = stress[c * D * LANES] * products[0];
             }
-            if (has_mass) across = fma(q[c * LANES], products[0], across);
+            if (a->values) across = fma(q[c * LANES], products[0], across);
             UNROLL for (int x = 0; x < width; x++) {
                 sums[c][x] = fma(across, n[x], sums[c][x]);
-                if (has_sets) sums[c][x] = fma(along, dn[x], sums[c][x]);
+                if (a->gradients) sums[c][x] = fma(along, dn[x], sums[c][x]);
             }
         }
     }
@@ -179,15 +300,42 @@ FUNCTION void IN_D(scatter_tile)(const struct Product *a, const struct Window *w
         for (int c = 0; c < D; c++) out[x * D + c] = sums[c][x];
 }
 
-#define SCATTER_TILE(W) IN_D(scatter_tile)(a, w, weights, numbers, at, start, W, out + start * D)
-
-// All tiles of the row.
-FUNCTION void IN_D(scatter)(const struct Product *a, const struct Window *w, const double *weights, const double *numbers,
-                            const int *at, double *out) {
-    for (int start = 0, width; start < w->width[0]; start += width) {
-        width = tile(w->width[0] - start);
-        WITH_WIDTH(width, SCATTER_TILE)
+// Row i of the diagonal blocks of a quadratic form, Σ B(∇N_I, ∇N_I) + m N_I² I over the particles of a group, for a tile of nodes along the row (y, z) of
+// its window (`sweep/blocks.rs`).
+FUNCTION void IN_D(scatter_blocks)(int i, const struct Window *w, const double *weights, const double *numbers,
+                                   const int *at, int start, const int width, double *out) {
+    double sums[D][WIDEST_TILE];
+    for (int j = 0; j < D; j++)
+        UNROLL for (int x = 0; x < width; x++) sums[j][x] = 0.0;
+    for (int p = 0; p < w->lanes; p++) {
+        double products[D], n[WIDEST_TILE], dn[WIDEST_TILE];
+        IN_D(across)(w, weights + p, at, 0, products);
+        IN_D(along)(w, weights + p, start, width, 0, n, dn);
+        const double *of_pairs = numbers + p;
+        // The coefficients of N_x'², N_x N_x' and N_x².
+        double powers[3][D];
+        for (int k = 0; k < 3 * D; k++) powers[k / D][k % D] = 0.0;
+        for (int l = 0; l < D; l++)
+            for (int k = 0; k <= l; k++) {
+                const double product = products[k] * products[l];
+                double *power = powers[(k > 0) + (l > 0)];
+                for (int j = 0; j < D; j++)
+                    power[j] = fma(of_pairs[((k + l * (l + 1) / 2) * D + j) * LANES], product, power[j]);
+            }
+        const double mass = of_pairs[PAIRS * D * LANES], square = products[0] * products[0];
+        for (int j = 0; j < D; j++)
+            if (j == i) powers[2][j] = fma(mass, square, powers[2][j]);
+        UNROLL for (int x = 0; x < width; x++) {
+            const double two = dn[x] * dn[x], one = n[x] * dn[x], none = n[x] * n[x];
+            for (int j = 0; j < D; j++) {
+                sums[j][x] = fma(powers[0][j], two, sums[j][x]);
+                if (D > 1) sums[j][x] = fma(powers[1][j], one, sums[j][x]);
+                sums[j][x] = fma(powers[2][j], none, sums[j][x]);
+            }
+        }
     }
+    UNROLL for (int x = 0; x < width; x++)
+        for (int j = 0; j < D; j++) out[x * D + j] = sums[j][x];
 }
 
 // Copies the field to the active nodes of the box, by thread t.
@@ -222,72 +370,66 @@ KERNEL(IN_D(volumes), Volumes) {
     }
 }
 
-// The box of a block: its part of K u, without lumped masses.
-KERNEL(IN_D(product), Product) {
-    SHARED(double, shared);
-    const struct Box box = box_of(&a.transfer, BLOCK);
-    double *nodal = shared, *out = nodal + box.nodes * D, *numbers = out + box.nodes * D;
-    struct Window *windows = (struct Window *)(numbers + NUMBERS * THREADS);
-    double *sums = (double *)(windows + TURN);
+// K u, without lumped masses.
+#define PASS product
+#define PASS_ARGUMENTS Product
+#define PASS_OF_A a.pass
+#define PASS_NUMBERS NUMBERS
+#define PASS_GATHERS 1
+#define PASS_POINT(group, lane, u, l, out) IN_D(evaluate)(&a, group, lane, u, l, out)
+#define PASS_SCATTER(...) IN_D(scatter)(&a.pass, 0, __VA_ARGS__)
+#include "pass.h"
+
+// Row i of the diagonal blocks of K, without lumped masses.
+#define PASS diagonal_blocks
+#define PASS_ARGUMENTS DiagonalBlocks
+#define PASS_OF_A a.product.pass
+#define PASS_NUMBERS (PAIRS * D + 1)
+#define PASS_GATHERS 0
+#define PASS_POINT(group, lane, u, l, out) IN_D(block_row)(&a, group, lane, out)
+#define PASS_SCATTER(...) IN_D(scatter_blocks)(a.i, __VA_ARGS__)
+#include "pass.h"
+
+// The residual's part at the particles, or its magnitude.
+#define PASS forces
+#define PASS_ARGUMENTS Forces
+#define PASS_OF_A a.pass
+#define PASS_NUMBERS NUMBERS
+#define PASS_GATHERS 1
+#define PASS_POINT(group, lane, u, l, out) IN_D(force)(&a, group, lane, u, l, out)
+#define PASS_SCATTER(...) IN_D(scatter)(&a.pass, a.pass.magnitudes, __VA_ARGS__)
+#include "pass.h"
+
+// The tangents of all particles.
+KERNEL(IN_D(linearize), Linearize) {
+    SHARED(double, nodal);
+    const struct Transfer *transfer = &a.transfer;
+    const struct Box box = box_of(transfer, BLOCK);
     PHASE(t) {
-        for (int i = t; i < box.nodes * D; i += THREADS) nodal[i] = out[i] = 0.0;
+        for (int i = t; i < box.nodes * D; i += THREADS) nodal[i] = 0.0;
     }
-    PHASE(t) { IN_D(load_box)(&a.transfer, BLOCK, t, a.u, nodal); }
-    const u32 groups = a.transfer.group_first[BLOCK + 1];
-    for (u32 turn = a.transfer.group_first[BLOCK]; turn < groups; turn += TURN) {
-        PHASE(t) {
-            const u32 group = turn + t / LANES;
-            const int lane = t % LANES;
-            if (group < groups && lane == 0) windows[t / LANES] = window_of(&a.transfer, &box, group, 0, D);
-            if (group < groups && lane < lanes_of(&a.transfer, group)) {
-                const struct Window w = window_of(&a.transfer, &box, group, lane, D);
-                double u[D], l[D][D], results[NUMBERS];
-                IN_D(gather)(nodal, &w, u, l);
-                IN_D(evaluate)(&a, group, lane, u, l, results);
-                for (int k = 0; k < NUMBERS; k++) numbers[(t / LANES * NUMBERS + k) * LANES + lane] = results[k];
-            }
-        }
-        for (u32 from = 0; from < TURN && turn + from < groups; from += a.together) {
-            // A thread is a row of a group's window.
-            PHASE(t) {
-                for (u32 i = t; i < (u32)(a.together * a.window_rows); i += THREADS) {
-                    const u32 k = from + i / a.window_rows;
-                    const int row = i % a.window_rows;
-                    if (k >= TURN || turn + k >= groups) continue;
-                    const struct Window *w = &windows[k];
-                    if (row >= w->width[1] * w->width[2]) continue;
-                    const int at[3] = {0, row % w->width[1], row / w->width[1]};
-                    const double *weights = a.transfer.weights + (i64)a.transfer.weights_first[turn + k] * LANES;
-                    double *own = sums + ((k - from) * a.window_nodes + row * w->width[0]) * D;
-                    IN_D(scatter)(&a, w, weights, numbers + k * NUMBERS * LANES, at, own);
-                }
-            }
-            // A thread is a row of the box, and a component: it adds the groups in their order.
-            PHASE(t) {
-                for (int i = t; i < box.size[1] * box.size[2] * D; i += THREADS) {
-                    const int row = i / D, c = i % D, y = row % box.size[1], z = row / box.size[1];
-                    for (u32 k = from; k < from + a.together && k < TURN && turn + k < groups; k++) {
-                        const struct Window *w = &windows[k];
-                        const int dy = y - w->place[1], dz = z - w->place[2];
-                        if (dy < 0 || dy >= w->width[1] || dz < 0 || dz >= w->width[2]) continue;
-                        const int first = (dz * w->width[1] + dy) * w->width[0];
-                        const double *own = sums + ((k - from) * a.window_nodes + first) * D + c;
-                        double *row_out = out + (row * box.size[0] + w->place[0]) * D + c;
-                        for (int x = 0; x < w->width[0]; x++) row_out[x * D] += own[x * D];
-                    }
-                }
-            }
-        }
-    }
-    double *boxes = a.boxes + (i64)a.transfer.box_first[BLOCK] * D;
+    PHASE(t) { IN_D(load_box)(transfer, BLOCK, t, a.u, nodal); }
+    const u32 first = transfer->group_first[BLOCK] * LANES, end = transfer->group_first[BLOCK + 1] * LANES;
     PHASE(t) {
-        for (int i = t; i < box.nodes * D; i += THREADS) boxes[i] = out[i];
+        for (u32 slot = first + t; slot < end; slot += THREADS) {
+            const u32 group = slot / LANES;
+            const int lane = slot % LANES;
+            if (lane >= lanes_of(transfer, group)) {
+                for (int k = 0; k < a.count; k++) a.rows[((i64)group * a.count + k) * LANES + lane] = 0.0;
+                continue;
+            }
+            const struct Window w = window_of(transfer, &box, group, lane, D);
+            double u[D], l[D][D];
+            IN_D(gather)(nodal, &w, u, l);
+            IN_D(linearized)(&a, group, lane, l);
+        }
     }
 }
 
 #undef NUMBERS
+#undef PAIRS
 #undef GATHER_TILE
-#undef SCATTER_TILE
+#undef OF_LAW
 #undef IN_D
 #undef JOIN
 #undef JOIN_

@@ -8,7 +8,7 @@ use super::tiled::Tiled;
 use super::{Each, shares};
 use crate::aggregation::Extension;
 use crate::approximation::ShapeFunction;
-use crate::gpu::{Gpu, Masses, Transfer};
+use crate::gpu::{Copies, Gpu};
 use crate::grid::Grid;
 use crate::parallel::Processes;
 use crate::pooled::{Element, Pool, Pooled};
@@ -16,8 +16,8 @@ use crate::scalar::Real;
 use crate::space::{Nodes, Space};
 use crate::tensor::{Tensor, Vector};
 use std::ops::Range;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, OnceLock};
 
 /// The shape-function values and the connectivity of all particles at the last grid reset, and the active nodes.
 ///
@@ -59,9 +59,8 @@ pub struct Connectivity<const D: usize> {
     extension: Option<Arc<Extension>>,
     /// The device on which linear systems are solved.
     pub(super) gpu: Option<Arc<Gpu>>,
-    /// The shape functions and the masses in its memory.
-    pub(super) on_device: OnceLock<Arc<Transfer>>,
-    pub(super) masses_on_device: OnceLock<Arc<Masses>>,
+    /// Copies in its memory.
+    pub(super) copies: Copies,
 }
 
 /// An implementation of the loop over the particles.
@@ -192,9 +191,8 @@ impl<const D: usize> Connectivity<D> {
         pool: &Pool,
     ) -> Self {
         let (nodes, fields, pool) = (nodes.clone(), points.fields.of_body.clone(), pool.clone());
-        let (passes, on_device, masses_on_device) = (AtomicU64::new(0), OnceLock::new(), OnceLock::new());
-        let (extension, gpu) = (None, None);
-        Self { implementation, grid: *grid, nodes, fields, passes, pool, extension, gpu, on_device, masses_on_device }
+        let (passes, copies, extension, gpu) = (AtomicU64::new(0), Copies::default(), None, None);
+        Self { implementation, grid: *grid, nodes, fields, passes, pool, extension, gpu, copies }
     }
 
     /// The fast loop, if the shape functions are products.
@@ -307,7 +305,7 @@ impl<const D: usize> Connectivity<D> {
     }
 
     /// Counts a pass over the particles.
-    pub(super) fn pass(&self) {
+    pub(crate) fn pass(&self) {
         self.passes.fetch_add(1, Ordering::Relaxed);
     }
 

@@ -1,9 +1,11 @@
-//! The shape functions of all particles as plain arrays, for a device.
+//! The shape functions and the particles as plain arrays, for a device.
 
-use super::Connectivity;
+use super::group::{At, Group};
 use super::tiled::Tiled;
-use crate::gpu::{Gpu, Masses, Transfer, TransferArrays};
+use super::{Connectivity, Each, Mode};
+use crate::gpu::{Buffer, Gpu, Masses, SolidArrays, Solids, Transfer, TransferArrays};
 use crate::lanes::LANES;
+use bytemuck::Pod;
 use std::sync::Arc;
 
 impl<const D: usize> Connectivity<D> {
@@ -13,21 +15,65 @@ impl<const D: usize> Connectivity<D> {
         self
     }
 
-    /// The shape functions on the device, copied there at the first call; `None` without a device, or for the plain loop.
+    /// The shape functions on the device; `None` without a device, or for the plain loop.
     pub(crate) fn on_device(&self) -> Option<&Arc<Transfer>> {
         let (gpu, tiled) = (self.gpu.as_ref()?, self.tiled()?);
         let copied = || {
             let weights = tiled.blocks.iter().map(|block| block.weights.as_slice());
             Arc::new(Transfer::new(gpu.clone(), &tiled.arrays(self.nodes.len()), weights))
         };
-        Some(self.on_device.get_or_init(copied))
+        Some(self.copies.transfer.get_or_init(copied))
     }
 
-    /// The masses of particles and nodes on the device, copied there at the first call.
-    pub(crate) fn masses_on_device(&self, gpu: &Gpu, mass: impl Fn(usize) -> f64, lumped: &[f64]) -> Arc<Masses> {
-        let by_lane = || self.tiled().map_or_else(Vec::new, |tiled| tiled.by_lane(mass));
-        let copied = || Masses { consistent: gpu.copy_of(&by_lane()), lumped: gpu.copy_of(lumped) };
-        self.masses_on_device.get_or_init(|| Arc::new(copied())).clone()
+    /// The masses of particles and nodes on the device.
+    pub(crate) fn masses_on_device(
+        &self,
+        gpu: &Gpu,
+        mass: impl Fn(usize) -> f64 + Sync,
+        lumped: &[f64],
+    ) -> Arc<Masses> {
+        let copied = || Masses { consistent: self.copied_by_lane(gpu, 1, |p, _| mass(p)), lumped: gpu.copy_of(lumped) };
+        self.copies.masses.get_or_init(|| Arc::new(copied())).clone()
+    }
+
+    /// The particles at the last grid reset, with their laws, on the device. `state(p, k)` has H_r by rows, then V₀.
+    pub(crate) fn solids_on_device(
+        &self,
+        transfer: &Transfer,
+        state: impl Fn(usize, usize) -> f64 + Sync,
+        body: impl Fn(usize) -> u32 + Sync,
+        laws: Vec<u32>,
+        constants: Vec<[f64; 2]>,
+    ) -> Arc<Solids> {
+        let copied = || {
+            let (states, bodies) = (self.by_lane(D * D + 1, state), self.by_lane(1, |p, _| body(p)));
+            Solids::new(transfer, &SolidArrays { states, bodies, laws, constants })
+        };
+        self.copies.solids.get_or_init(|| Arc::new(copied())).clone()
+    }
+
+    /// `of(p, row)` of all particles, `count` rows of lanes for each group, on the device.
+    pub(crate) fn copied_by_lane(
+        &self,
+        gpu: &Gpu,
+        count: usize,
+        of: impl Fn(usize, usize) -> f64 + Sync,
+    ) -> Buffer<f64> {
+        gpu.copy_of(self.by_lane(count, of).as_flattened())
+    }
+
+    /// `of(p, row)` of all particles, `count` rows of lanes for each group; zero in empty lanes.
+    fn by_lane<T: Pod + Send>(&self, count: usize, of: impl Fn(usize, usize) -> T + Sync) -> Vec<[T; LANES]> {
+        let mut rows = vec![[T::zeroed(); LANES]; self.groups() * count];
+        let evaluate = |group: Group<'_>, _: &[At<f64, D, D>], rows: &mut [[T; LANES]]| {
+            for (k, row) in rows.iter_mut().enumerate() {
+                row.iter_mut().zip(group.particles).for_each(|(lane, &p)| *lane = of(p as usize, k));
+            }
+        };
+        if let Some(tiled) = self.tiled() {
+            tiled.results(Each::Group(count), 0, None, Mode::BOTH, &evaluate, &mut rows);
+        }
+        rows
     }
 }
 
@@ -66,15 +112,5 @@ impl<const D: usize> Tiled<D> {
         arrays.node_first.push(arrays.nodes.len() as u32);
         arrays.box_first.push(places);
         arrays
-    }
-
-    fn by_lane(&self, of: impl Fn(usize) -> f64) -> Vec<f64> {
-        let mut numbers = vec![0.0; self.groups() * LANES];
-        self.each_group(&mut |group| {
-            for (lane, &p) in group.particles.iter().enumerate() {
-                numbers[group.number * LANES + lane] = of(p as usize);
-            }
-        });
-        numbers
     }
 }

@@ -1,6 +1,7 @@
 //! Inertia, M̃ a with a = α₁ (φ − φ̂): eq. 33 with the sign corrected.
 
 use super::term::{AtPoints, Step, Sum, Term, summed};
+use crate::gpu::{self, Buffer, Gpu, InertiaOfParticles};
 use crate::mechanics::constitutive::Part;
 use crate::mechanics::kinematics::Inadmissible;
 use crate::mechanics::linearized::Linearized;
@@ -12,6 +13,7 @@ use crate::mechanics::trial::Trial;
 use crate::parallel;
 use crate::pooled::Pooled;
 use crate::tensor::{Tensor, Vector};
+use std::sync::OnceLock;
 
 /// M̃ a; absent without inertia.
 pub(crate) struct Inertia<'a, const D: usize> {
@@ -20,6 +22,7 @@ pub(crate) struct Inertia<'a, const D: usize> {
     alphas: Alphas,
     /// φ̂ at the particles; empty for a lumped mass.
     predicted: Pooled<Vector<f64, D>>,
+    predicted_on_device: OnceLock<Buffer<f64>>,
 }
 
 impl<'a, const D: usize> Inertia<'a, D> {
@@ -33,7 +36,20 @@ impl<'a, const D: usize> Inertia<'a, D> {
             let of_nodes = mass.connectivity.pool().made(mass.lumped.len(), |node| nodal.predicted(&alphas, node));
             predicted = mass.connectivity.values(&of_nodes);
         }
-        Some(Self { mass, nodal, alphas, predicted })
+        Some(Self { mass, nodal, alphas, predicted, predicted_on_device: OnceLock::new() })
+    }
+
+    /// The consistent part on a device; `None` if the mass is lumped.
+    pub(super) fn on_device(&self, gpu: &Gpu) -> Option<InertiaOfParticles<'_>> {
+        let Self { mass, predicted, .. } = self;
+        if predicted.is_empty() {
+            return None;
+        }
+        let connectivity = mass.connectivity;
+        let masses = connectivity.masses_on_device(gpu, |p| mass.particles.mass[p], mass.lumped);
+        let inertia = gpu::Inertia { masses, factor: self.alphas.a1, lumping: mass.lumping };
+        let copied = || connectivity.copied_by_lane(gpu, D, |p, c| predicted[p][c]);
+        Some((inertia, self.predicted_on_device.get_or_init(copied)))
     }
 
     /// ε m_I and a_I of a node.

@@ -133,6 +133,29 @@ impl<'a, const D: usize, L: Law> Terms<'a, D, L> {
         self.picked(picked).filter_map(|any| of_term!(any, term => term.at_points(part, at))).collect()
     }
 
+    /// Adds the contributions at the particles, or their magnitudes, of all terms that `picked` selects, if they run on the device. Returns
+    /// whether it did; if not, `out` is as before.
+    pub(crate) fn add_on_device(
+        &self,
+        picked: impl Fn(&str, Role) -> bool,
+        magnitudes: bool,
+        phi: &[f64],
+        out: &mut [f64],
+    ) -> bool {
+        let (mut inertia, mut stress) = (None, None);
+        for any in self.picked(picked) {
+            match any {
+                AnyTerm::Inertia(one) => inertia = Some(one),
+                AnyTerm::Stress(one) => stress = Some(one),
+                AnyTerm::MeanDilatation(_) | AnyTerm::DilatationOfStep(_) => return false,
+                // These act at nodes.
+                AnyTerm::Damping(_) | AnyTerm::DeadLoad(_) | AnyTerm::Pressure(_) | AnyTerm::ContactForce(_) => {}
+            }
+        }
+        let inertia = inertia.filter(|_| !magnitudes);
+        stress.is_some_and(|stress| stress.add_on_device(inertia, magnitudes, phi, out))
+    }
+
     /// The sum of all energies; `None` if a term has no potential.
     pub(crate) fn energy<T: Number>(&self, phi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>> {
         let (mut sum, mut magnitude) = (T::zero(), 0.0);

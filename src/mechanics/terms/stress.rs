@@ -1,8 +1,9 @@
 //! The internal force Σ_p V₀ F S ∇N (eq. 17), and its tangent, geometric and material (eqs. 34, 38).
 
+use super::inertia::Inertia;
 use super::term::{AtPoints, Step, Sum, Term, summed};
 use crate::material::Law;
-use crate::mechanics::constitutive::{Laws, Part};
+use crate::mechanics::constitutive::{Form, Laws, Part};
 use crate::mechanics::kinematics::{Inadmissible, Kinematics};
 use crate::mechanics::linearized::{Linearized, TangentRows};
 use crate::mechanics::sweep::{Connectivity, Mode, Number, Weights};
@@ -26,10 +27,40 @@ impl<'a, const D: usize, L: Law> Stress<'a, D, L> {
         &self.laws.bodies[self.laws.particles.body[p] as usize].law
     }
 
+    /// Adds the forces, with the consistent part of inertia if given, or the magnitudes of the forces, on the device. Returns whether it did; if
+    /// not, `out` is as before.
+    pub(super) fn add_on_device(
+        &self,
+        inertia: Option<&Inertia<'_, D>>,
+        magnitudes: bool,
+        phi: &[f64],
+        out: &mut [f64],
+    ) -> bool {
+        let Some((transfer, solids)) = self.laws.on_device(self.connectivity) else { return false };
+        let inertia = inertia.and_then(|inertia| inertia.on_device(transfer.gpu()));
+        self.connectivity.pass();
+        solids.add_forces(&transfer, inertia.as_ref(), magnitudes, phi, out)
+    }
+
+    /// The tangent linearised at φ on the device; `None` if it does not run there, or a particle has det F ≤ 0.
+    fn linearized_on_device(&self, phi: &[Vector<f64, D>], part: Part, form: Form) -> Option<TangentRows> {
+        if part != Part::Whole || form == Form::General {
+            return None;
+        }
+        let (transfer, solids) = self.laws.on_device(self.connectivity)?;
+        let (count, groups) = (form.rows(D), self.connectivity.groups());
+        let rows = solids.linearized(&transfer, count, bytemuck::cast_slice(phi))?;
+        self.connectivity.pass();
+        Some(TangentRows::of_device(form, count, groups, transfer.gpu(), rows, self.connectivity.pool()))
+    }
+
     /// The tangent linearised at φ, whole or one `part`.
     pub(super) fn linearized(&self, phi: &[Vector<f64, D>], part: Part) -> Result<TangentRows, Inadmissible> {
         let form = self.laws.form();
         let count = form.rows(D);
+        if let Some(rows) = self.linearized_on_device(phi, part, form) {
+            return Ok(rows);
+        }
         let own = self.connectivity.own_groups();
         let mut rows = self.connectivity.pool().unspecified(own.len() * count);
         let evaluate = self.laws.tangents(part, form);

@@ -143,12 +143,12 @@ impl Law for Wrong {
         }
     }
 
-    fn closed<const D: usize>(
+    fn closed<T: Real, const D: usize>(
         &self,
-        f_n: &Tensor<f64, D>,
-        at: &MaterialState<f64, D>,
-        volume: f64,
-    ) -> Option<ClosedTangent<f64, D>> {
+        f_n: &Tensor<T, D>,
+        at: &MaterialState<T, D>,
+        volume: T,
+    ) -> Option<ClosedTangent<T, D>> {
         if self.general {
             return None;
         }
@@ -160,14 +160,14 @@ impl Law for Wrong {
         }?;
         match self.fault {
             Fault::ClosedGeometricSign => {
-                let geometric = f_n * law.stress(at) * f_n.transpose() * volume;
+                let geometric = scaled(&(f_n * law.stress(at) * f_n.transpose()), volume);
                 for i in 0..D {
                     for k in 0..D {
-                        closed.right[i][k] -= 2.0 * geometric[(i, k)];
+                        closed.right[i][k] -= T::lit(2.0) * geometric[(i, k)];
                     }
                 }
             }
-            Fault::ClosedWithoutQ => closed.q = 0.0,
+            Fault::ClosedWithoutQ => closed.q = T::zero(),
             _ => {}
         }
         Some(closed)

@@ -1,0 +1,120 @@
+//! The particles with their laws on a device, where the laws are formulas (`kernels/recorded.h`): forces in the residual, and tangents.
+
+use super::device::{Buffer, arguments};
+use super::product::{Inertia, InertiaArguments};
+use super::transfer::{Gathers, Transfer};
+use crate::lanes::LANES;
+
+/// The particles at the last grid reset, and the laws of their bodies, as plain arrays.
+#[derive(Debug)]
+pub(crate) struct SolidArrays {
+    /// Of each group, a row of lanes each: H_r by rows, then V₀.
+    pub states: Vec<[f64; LANES]>,
+    /// Of each group, the bodies of its particles.
+    pub bodies: Vec<[u32; LANES]>,
+    /// The number of the law of each body ([`Formula`](crate::material::Formula)).
+    pub laws: Vec<u32>,
+    /// The constants of the law of each body.
+    pub constants: Vec<[f64; 2]>,
+}
+
+/// [`SolidArrays`] on a device.
+#[derive(Debug)]
+pub(crate) struct Solids {
+    states: Buffer<f64>,
+    bodies: Buffer<u32>,
+    laws: Buffer<u32>,
+    constants: Buffer<f64>,
+}
+
+/// `Solids` of `kernels/data.h`.
+#[derive(Clone, Copy)]
+#[repr(C)]
+struct SolidsArguments {
+    states: u64,
+    bodies: u64,
+    laws: u64,
+    constants: u64,
+    failed: u64,
+}
+
+/// The inertia of particles in the residual: their masses with α₁, and φ̂ at the particles, a row of lanes for each component of each group.
+pub(crate) type InertiaOfParticles<'a> = (Inertia, &'a Buffer<f64>);
+
+impl Solids {
+    pub(crate) fn new(transfer: &Transfer, arrays: &SolidArrays) -> Self {
+        let gpu = transfer.gpu();
+        Self {
+            states: gpu.copy_of(arrays.states.as_flattened()),
+            bodies: gpu.copy_of(arrays.bodies.as_flattened()),
+            laws: gpu.copy_of(&arrays.laws),
+            constants: gpu.copy_of(arrays.constants.as_flattened()),
+        }
+    }
+
+    /// Runs `launch` with the particles. Whether all particles have det F > 0, and the device has not failed.
+    fn succeed(&self, transfer: &Transfer, launch: impl FnOnce(SolidsArguments)) -> bool {
+        let gpu = transfer.gpu();
+        let failed = gpu.copy_of(&[0_u32]);
+        launch(SolidsArguments {
+            states: self.states.address(),
+            bodies: self.bodies.address(),
+            laws: self.laws.address(),
+            constants: self.constants.address(),
+            failed: failed.address(),
+        });
+        let mut has_failed = [1];
+        gpu.read_at(&failed, 0, &mut has_failed);
+        has_failed == [0] && gpu.check().is_ok()
+    }
+
+    /// `out +=` Σ_p q N_I + σ ∇_r N_I at φ, with σ = V₀ F S F_rᵀ and the inertia of the particles; or Σ_p |σ| |∇_r N_I| if `magnitudes`.
+    /// Returns whether it did; if not, `out` is as before.
+    pub(crate) fn add_forces(
+        &self,
+        transfer: &Transfer,
+        inertia: Option<&InertiaOfParticles<'_>>,
+        magnitudes: bool,
+        phi: &[f64],
+        out: &mut [f64],
+    ) -> bool {
+        let gpu = transfer.gpu();
+        let _lock = gpu.lock();
+        let (phi, start, mut sums) = (gpu.copy_of(phi), gpu.copy_of(out), gpu.memory_for(out.len()));
+        let succeeded = self.succeed(transfer, |solids| {
+            let gathers = Gathers { values: inertia.is_some(), gradients: true, magnitudes };
+            // `Forces` of `kernels/data.h`.
+            let arguments = arguments! {
+                pass: transfer.pass(phi.address(), gathers),
+                solids,
+                inertia: InertiaArguments::of(inertia.map(|(inertia, _)| inertia)),
+                predicted: inertia.map_or(0, |(_, predicted)| predicted.address()),
+            };
+            transfer.launch(["forces_1", "forces_2", "forces_3"], transfer.shared, &arguments);
+            transfer.add_boxes(&start, &mut sums);
+        });
+        if succeeded {
+            gpu.read_at(&sums, 0, out);
+        }
+        succeeded && gpu.check().is_ok()
+    }
+
+    /// The tangents at φ in a closed form, with `count` rows a group; `None` if a particle has det F ≤ 0, or the device fails.
+    pub(crate) fn linearized(&self, transfer: &Transfer, count: usize, phi: &[f64]) -> Option<Buffer<f64>> {
+        let gpu = transfer.gpu();
+        let phi = gpu.copy_of(phi);
+        let rows = gpu.memory_for(self.bodies.len() * count);
+        let succeeded = self.succeed(transfer, |solids| {
+            // `Linearize` of `kernels/data.h`.
+            let arguments = arguments! {
+                transfer: transfer.arguments(),
+                u: phi.address(),
+                solids,
+                rows: rows.address(),
+                count: count as i32,
+            };
+            transfer.launch(["linearize_1", "linearize_2", "linearize_3"], transfer.shared, &arguments);
+        });
+        succeeded.then_some(rows)
+    }
+}
