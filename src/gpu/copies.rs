@@ -1,7 +1,7 @@
 //! The copies of particles and their shape functions on a device.
 
 use super::product::Masses;
-use super::solids::Solids;
+use super::solids::States;
 use super::transfer::Transfer;
 use std::sync::{Arc, OnceLock};
 
@@ -10,5 +10,5 @@ use std::sync::{Arc, OnceLock};
 pub(crate) struct Copies {
     pub transfer: OnceLock<Arc<Transfer>>,
     pub masses: OnceLock<Arc<Masses>>,
-    pub solids: OnceLock<Arc<Solids>>,
+    pub states: OnceLock<Arc<States>>,
 }

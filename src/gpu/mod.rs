@@ -26,7 +26,7 @@ pub(crate) use multigrid::{Filter, Level, LevelArrays};
 pub(crate) use points::{NO_OBSTACLE, PointArrays, Points};
 pub(crate) use product::{Inertia, Masses, OfParticles, Product, SETS};
 pub(crate) use rows::{Cells, Rows};
-pub(crate) use solids::{InertiaOfParticles, SolidArrays, Solids};
+pub(crate) use solids::{InertiaOfParticles, Solids, States};
 pub(crate) use transfer::{Transfer, TransferArrays};
 pub use vectors::GpuVector;
 

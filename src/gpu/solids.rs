@@ -1,28 +1,31 @@
 //! The particles with their laws on a device, where the laws are formulas (`kernels/recorded.h`): forces in the residual, and tangents.
 
-use super::device::{Buffer, arguments};
+use super::device::{Buffer, Gpu, arguments};
 use super::product::{Inertia, InertiaArguments};
 use super::transfer::{Gathers, Transfer};
 use crate::lanes::LANES;
+use crate::material::Formula;
+use std::sync::Arc;
 
-/// The particles at the last grid reset, and the laws of their bodies, as plain arrays.
+/// The states of the particles at the last grid reset, on a device.
 #[derive(Debug)]
-pub(crate) struct SolidArrays {
-    /// Of each group, a row of lanes each: H_r by rows, then V₀.
-    pub states: Vec<[f64; LANES]>,
-    /// Of each group, the bodies of its particles.
-    pub bodies: Vec<[u32; LANES]>,
-    /// The number of the law of each body ([`Formula`](crate::material::Formula)).
-    pub laws: Vec<u32>,
-    /// The constants of the law of each body.
-    pub constants: Vec<[f64; 2]>,
-}
-
-/// [`SolidArrays`] on a device.
-#[derive(Debug)]
-pub(crate) struct Solids {
+pub(crate) struct States {
     states: Buffer<f64>,
     bodies: Buffer<u32>,
+}
+
+impl States {
+    /// Of each group, a row of lanes each: H_r by rows, then V₀; and a row of the bodies.
+    pub(crate) fn new(gpu: &Gpu, states: &[[f64; LANES]], bodies: &[[u32; LANES]]) -> Self {
+        Self { states: gpu.copy_of(states.as_flattened()), bodies: gpu.copy_of(bodies.as_flattened()) }
+    }
+}
+
+/// The particles with the laws of their bodies, on a device.
+#[derive(Debug)]
+pub(crate) struct Solids {
+    transfer: Arc<Transfer>,
+    of_particles: Arc<States>,
     laws: Buffer<u32>,
     constants: Buffer<f64>,
 }
@@ -42,23 +45,27 @@ struct SolidsArguments {
 pub(crate) type InertiaOfParticles<'a> = (Inertia, &'a Buffer<f64>);
 
 impl Solids {
-    pub(crate) fn new(transfer: &Transfer, arrays: &SolidArrays) -> Self {
+    /// The particles with the law of each body.
+    pub(crate) fn new(transfer: Arc<Transfer>, of_particles: Arc<States>, formulas: &[Formula]) -> Self {
         let gpu = transfer.gpu();
-        Self {
-            states: gpu.copy_of(arrays.states.as_flattened()),
-            bodies: gpu.copy_of(arrays.bodies.as_flattened()),
-            laws: gpu.copy_of(&arrays.laws),
-            constants: gpu.copy_of(arrays.constants.as_flattened()),
-        }
+        let laws: Vec<u32> = formulas.iter().map(|formula| formula.law).collect();
+        let constants: Vec<f64> = formulas.iter().flat_map(|formula| formula.constants).collect();
+        let (laws, constants) = (gpu.copy_of(&laws), gpu.copy_of(&constants));
+        Self { transfer, of_particles, laws, constants }
+    }
+
+    /// The device.
+    pub(crate) fn gpu(&self) -> &Arc<Gpu> {
+        self.transfer.gpu()
     }
 
     /// Runs `launch` with the particles. Whether all particles have det F > 0, and the device has not failed.
-    fn succeed(&self, transfer: &Transfer, launch: impl FnOnce(SolidsArguments)) -> bool {
-        let gpu = transfer.gpu();
+    fn succeed(&self, launch: impl FnOnce(SolidsArguments)) -> bool {
+        let gpu = self.gpu();
         let failed = gpu.copy_of(&[0_u32]);
         launch(SolidsArguments {
-            states: self.states.address(),
-            bodies: self.bodies.address(),
+            states: self.of_particles.states.address(),
+            bodies: self.of_particles.bodies.address(),
             laws: self.laws.address(),
             constants: self.constants.address(),
             failed: failed.address(),
@@ -72,16 +79,15 @@ impl Solids {
     /// Returns whether it did; if not, `out` is as before.
     pub(crate) fn add_forces(
         &self,
-        transfer: &Transfer,
         inertia: Option<&InertiaOfParticles<'_>>,
         magnitudes: bool,
         phi: &[f64],
         out: &mut [f64],
     ) -> bool {
-        let gpu = transfer.gpu();
+        let (gpu, transfer) = (self.gpu(), &self.transfer);
         let _lock = gpu.lock();
         let (phi, start, mut sums) = (gpu.copy_of(phi), gpu.copy_of(out), gpu.memory_for(out.len()));
-        let succeeded = self.succeed(transfer, |solids| {
+        let succeeded = self.succeed(|solids| {
             let gathers = Gathers { values: inertia.is_some(), gradients: true, magnitudes };
             // `Forces` of `kernels/data.h`.
             let arguments = arguments! {
@@ -100,11 +106,11 @@ impl Solids {
     }
 
     /// The tangents at φ in a closed form, with `count` rows a group; `None` if a particle has det F ≤ 0, or the device fails.
-    pub(crate) fn linearized(&self, transfer: &Transfer, count: usize, phi: &[f64]) -> Option<Buffer<f64>> {
-        let gpu = transfer.gpu();
+    pub(crate) fn linearized(&self, count: usize, phi: &[f64]) -> Option<Buffer<f64>> {
+        let (gpu, transfer) = (self.gpu(), &self.transfer);
         let phi = gpu.copy_of(phi);
-        let rows = gpu.memory_for(self.bodies.len() * count);
-        let succeeded = self.succeed(transfer, |solids| {
+        let rows = gpu.memory_for(self.of_particles.bodies.len() * count);
+        let succeeded = self.succeed(|solids| {
             // `Linearize` of `kernels/data.h`.
             let arguments = arguments! {
                 transfer: transfer.arguments(),

@@ -80,15 +80,14 @@ impl<const D: usize, L: Law> Laws<'_, D, L> {
     }
 
     /// The particles with their laws on the device of their shape functions, if all laws are formulas.
-    pub(super) fn on_device(&self, connectivity: &Connectivity<D>) -> Option<(Arc<Transfer>, Arc<Solids>)> {
+    pub(super) fn on_device(&self, connectivity: &Connectivity<D>) -> Option<Solids> {
         let (transfer, formulas) = (connectivity.on_device()?, self.formulas()?);
         let (particles, reference) = (self.particles, self.particles.reference());
         let state = |p: usize, k: usize| {
             let h_r = &reference.displacement_gradient[p];
             if k < D * D { h_r[(k / D, k % D)] } else { particles.volume[p] }
         };
-        let (laws, constants) = formulas.iter().map(|formula| (formula.law, formula.constants)).unzip();
-        let solids = connectivity.solids_on_device(transfer, state, |p| particles.body[p], laws, constants);
-        Some((transfer.clone(), solids))
+        let states = connectivity.states_on_device(transfer.gpu(), state, |p| particles.body[p]);
+        Some(Solids::new(transfer.clone(), states, &formulas))
     }
 }

@@ -1,4 +1,4 @@
-//! The memory that the linear systems of a run take on a GPU.
+//! The memory that a run takes on a GPU.
 
 use super::arrays::NUMBER;
 use crate::approximation::ShapeFunction;
@@ -12,7 +12,7 @@ use crate::particles::Body;
 use crate::simulation::Simulation;
 use crate::solver::{Krylov, Preconditioning, multigrid_bytes};
 
-/// The memory that the linear systems of a run take on a GPU.
+/// The memory that a run takes on a GPU.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DeviceUse {
     /// Bytes of the device's memory.
@@ -67,7 +67,7 @@ impl DeviceUse {
         Ok(Self { bytes, shared, sent })
     }
 
-    /// Whether the linear systems fit on a device. Returns the free bytes of its memory.
+    /// Whether the run fits on a device. Returns the free bytes of its memory.
     ///
     /// # Errors
     /// They do not fit.

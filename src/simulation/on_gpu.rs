@@ -1,4 +1,4 @@
-//! Linear systems on a GPU, and the parts of a simulation that do not run there yet.
+//! Newton's method on a GPU, and the parts of a simulation that do not run there yet.
 
 use super::Simulation;
 use crate::approximation::ShapeFunction;
@@ -8,7 +8,7 @@ use crate::mechanics::sweep::WIDEST;
 use std::sync::Arc;
 
 impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
-    /// Solves the linear systems of all further steps on the GPU of this machine, which is returned.
+    /// Runs Newton's method of all further steps on the GPU of this machine, which is returned.
     ///
     /// ```
     /// use bfree::gpu::GpuError;
@@ -31,7 +31,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         Ok(gpu)
     }
 
-    /// Whether the linear systems can be solved on a GPU.
+    /// Whether Newton's method can run on a GPU.
     ///
     /// # Errors
     /// The first part that cannot.

@@ -307,7 +307,7 @@ impl StepError {
         matches!(self, Self::Newton(error) if matches!(error.cause, NewtonFailure::Stopped))
     }
 
-    /// Whether the device failed on which linear systems are solved.
+    /// Whether the device failed on which Newton's method runs.
     pub(crate) fn is_of_device(&self) -> bool {
         matches!(self, Self::Newton(error) if error.cause.is_of_device())
     }

@@ -3,13 +3,13 @@
 use super::group::{At, Group};
 use super::tiled::Tiled;
 use super::{Connectivity, Each, Mode};
-use crate::gpu::{Buffer, Gpu, Masses, SolidArrays, Solids, Transfer, TransferArrays};
+use crate::gpu::{Buffer, Gpu, Masses, States, Transfer, TransferArrays};
 use crate::lanes::LANES;
 use bytemuck::Pod;
 use std::sync::Arc;
 
 impl<const D: usize> Connectivity<D> {
-    /// This connectivity with a device, on which linear systems are solved.
+    /// This connectivity with a device, on which Newton's method runs.
     pub(crate) fn with_gpu(mut self, gpu: Option<Arc<Gpu>>) -> Self {
         self.gpu = gpu;
         self
@@ -36,20 +36,15 @@ impl<const D: usize> Connectivity<D> {
         self.copies.masses.get_or_init(|| Arc::new(copied())).clone()
     }
 
-    /// The particles at the last grid reset, with their laws, on the device. `state(p, k)` has H_r by rows, then V₀.
-    pub(crate) fn solids_on_device(
+    /// The particles at the last grid reset on the device. `state(p, k)` has H_r by rows, then V₀.
+    pub(crate) fn states_on_device(
         &self,
-        transfer: &Transfer,
+        gpu: &Gpu,
         state: impl Fn(usize, usize) -> f64 + Sync,
         body: impl Fn(usize) -> u32 + Sync,
-        laws: Vec<u32>,
-        constants: Vec<[f64; 2]>,
-    ) -> Arc<Solids> {
-        let copied = || {
-            let (states, bodies) = (self.by_lane(D * D + 1, state), self.by_lane(1, |p, _| body(p)));
-            Solids::new(transfer, &SolidArrays { states, bodies, laws, constants })
-        };
-        self.copies.solids.get_or_init(|| Arc::new(copied())).clone()
+    ) -> Arc<States> {
+        let copied = || States::new(gpu, &self.by_lane(D * D + 1, state), &self.by_lane(1, |p, _| body(p)));
+        self.copies.states.get_or_init(|| Arc::new(copied())).clone()
     }
 
     /// `of(p, row)` of all particles, `count` rows of lanes for each group, on the device.

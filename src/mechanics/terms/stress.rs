@@ -36,10 +36,10 @@ impl<'a, const D: usize, L: Law> Stress<'a, D, L> {
         phi: &[f64],
         out: &mut [f64],
     ) -> bool {
-        let Some((transfer, solids)) = self.laws.on_device(self.connectivity) else { return false };
-        let inertia = inertia.and_then(|inertia| inertia.on_device(transfer.gpu()));
+        let Some(solids) = self.laws.on_device(self.connectivity) else { return false };
+        let inertia = inertia.and_then(|inertia| inertia.on_device(solids.gpu()));
         self.connectivity.pass();
-        solids.add_forces(&transfer, inertia.as_ref(), magnitudes, phi, out)
+        solids.add_forces(inertia.as_ref(), magnitudes, phi, out)
     }
 
     /// The tangent linearised at φ on the device; `None` if it does not run there, or a particle has det F ≤ 0.
@@ -47,11 +47,11 @@ impl<'a, const D: usize, L: Law> Stress<'a, D, L> {
         if part != Part::Whole || form == Form::General {
             return None;
         }
-        let (transfer, solids) = self.laws.on_device(self.connectivity)?;
+        let solids = self.laws.on_device(self.connectivity)?;
         let (count, groups) = (form.rows(D), self.connectivity.groups());
-        let rows = solids.linearized(&transfer, count, bytemuck::cast_slice(phi))?;
+        let rows = solids.linearized(count, bytemuck::cast_slice(phi))?;
         self.connectivity.pass();
-        Some(TangentRows::of_device(form, count, groups, transfer.gpu(), rows, self.connectivity.pool()))
+        Some(TangentRows::of_device(form, count, groups, solids.gpu(), rows, self.connectivity.pool()))
     }
 
     /// The tangent linearised at φ, whole or one `part`.

@@ -86,7 +86,7 @@ pub enum NewtonFailure<E: std::error::Error + 'static> {
 }
 
 impl<E: std::error::Error + 'static> NewtonFailure<E> {
-    /// Whether the device failed on which linear systems are solved.
+    /// Whether the device failed on which Newton's method runs.
     pub(crate) fn is_of_device(&self) -> bool {
         matches!(self, Self::LinearSolverFailed(LinearSolverFailure::Device(_)))
     }
