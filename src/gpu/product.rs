@@ -96,25 +96,31 @@ impl OfParticles {
         if gpu.check_shared(self.transfer.shared_of_blocks).is_err() {
             return false;
         }
-        let _lock = gpu.lock();
-        let product = self.arguments(0, Rows::alone);
-        let row = |i: usize| {
-            let mut row: Vec<f64> = vec![0.0; blocks.len() / d];
-            parallel::each(&mut row, |k, entry| *entry = blocks[k / d * d * d + k % d * d + i]);
-            let (start, mut sums) = (gpu.copy_of(&row), gpu.memory_for(row.len()));
-            // `DiagonalBlocks` of `kernels/data.h`.
-            let kernels = ["diagonal_blocks_1", "diagonal_blocks_2", "diagonal_blocks_3"];
-            self.transfer.launch(kernels, self.transfer.shared_of_blocks, &arguments! { product, i: i as i32 });
-            self.transfer.add_boxes(&start, &mut sums);
-            gpu.read_at(&sums, 0, &mut row);
-            row
-        };
-        let rows: Vec<Vec<f64>> = (0..d).map(row).collect();
+        let mut rows: Vec<Vec<f64>> = (0..d).map(|_| vec![0.0; blocks.len() / d]).collect();
+        for (i, row) in rows.iter_mut().enumerate() {
+            parallel::each(row, |k, entry| *entry = blocks[k / d * d * d + k % d * d + i]);
+        }
+        self.add_rows_of_blocks(&mut rows);
         let succeeded = gpu.check().is_ok();
         if succeeded {
             parallel::each(blocks, |k, entry| *entry = rows[k % d][k / (d * d) * d + k / d % d]);
         }
         succeeded
+    }
+
+    /// Adds the particles to row i of all blocks, for each i. No loop is shared here: its tasks could ask for the locked device.
+    fn add_rows_of_blocks(&self, rows: &mut [Vec<f64>]) {
+        let gpu = self.transfer.gpu();
+        let _lock = gpu.lock();
+        let product = self.arguments(0, Rows::alone);
+        for (i, row) in rows.iter_mut().enumerate() {
+            let (start, mut sums) = (gpu.copy_of(row), gpu.memory_for(row.len()));
+            // `DiagonalBlocks` of `kernels/data.h`.
+            let kernels = ["diagonal_blocks_1", "diagonal_blocks_2", "diagonal_blocks_3"];
+            self.transfer.launch(kernels, self.transfer.shared_of_blocks, &arguments! { product, i: i as i32 });
+            self.transfer.add_boxes(&start, &mut sums);
+            gpu.read_at(&sums, 0, row);
+        }
     }
 }
 

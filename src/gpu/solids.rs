@@ -99,10 +99,16 @@ impl Solids {
             transfer.launch(["forces_1", "forces_2", "forces_3"], transfer.shared, &arguments);
             transfer.add_boxes(&start, &mut sums);
         });
+        // A copy that fails may have written a part.
+        let mut all = vec![0.0; out.len()];
         if succeeded {
-            gpu.read_at(&sums, 0, out);
+            gpu.read_at(&sums, 0, &mut all);
         }
-        succeeded && gpu.check().is_ok()
+        let succeeded = succeeded && gpu.check().is_ok();
+        if succeeded {
+            out.copy_from_slice(&all);
+        }
+        succeeded
     }
 
     /// The tangents at φ in a closed form, with `count` rows a group; `None` if a particle has det F ≤ 0, or the device fails.

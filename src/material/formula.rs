@@ -5,7 +5,7 @@ use super::{Law, Material};
 /// A law with its constants.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Formula {
-    /// The number of the law on the device (`gpu/kernels/laws.h`).
+    /// The number of the law on the device (`gpu/kernels/data.h`).
     pub law: u32,
     /// Λ and G.
     pub constants: [f64; 2],

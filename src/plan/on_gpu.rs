@@ -19,7 +19,8 @@ pub struct DeviceUse {
     pub bytes: usize,
     /// Bytes that the threads of a block share.
     pub shared: usize,
-    /// Bytes of the linearised laws that are sent to the device in each Newton iteration; 0 if the laws are evaluated there.
+    /// Bytes of the linearised laws that are sent to the device in each Newton iteration; 0 if the device evaluates the laws, where averaged
+    /// cells alone are sent.
     pub sent: usize,
 }
 
@@ -45,7 +46,7 @@ impl DeviceUse {
         // H_r, V₀ and the body of each particle, and φ̂ for a consistent mass.
         let predicted = if has_inertia && settings.lumping < 1.0 { by_lane * D } else { 0 };
         let solids = if are_formulas { by_lane * (D * D + 1) + by_lane / 2 + predicted } else { 0 };
-        let sent = if are_formulas { 0 } else { laws } + cells;
+        let sent = if are_formulas { 0 } else { laws + cells };
         let masses = if has_inertia { by_lane + nodes * NUMBER } else { 0 };
         let multigrid = simulation.preconditioner().0 == Preconditioning::Multigrid;
         let vectors = match simulation.krylov().0 {

@@ -39,7 +39,9 @@ impl Copies {
     #[cold]
     fn fetched(&self) -> Pooled<[f64; LANES]> {
         let (Some((gpu, rows, pool)), Some(there)) = (&self.source, self.there.get()) else { return Pooled::default() };
-        let mut here = pool.filled(*rows, [f64::NAN; LANES]);
+        // A shared loop could run another task here, which would wait for these rows for ever.
+        let mut here = pool.unspecified(*rows);
+        here.fill([f64::NAN; LANES]);
         gpu.read_at(there, 0, here.as_flattened_mut());
         here
     }

@@ -38,8 +38,11 @@ impl<'a, const D: usize, L: Law> Stress<'a, D, L> {
     ) -> bool {
         let Some(solids) = self.laws.on_device(self.connectivity) else { return false };
         let inertia = inertia.and_then(|inertia| inertia.on_device(solids.gpu()));
-        self.connectivity.pass();
-        solids.add_forces(inertia.as_ref(), magnitudes, phi, out)
+        let is_added = solids.add_forces(inertia.as_ref(), magnitudes, phi, out);
+        if is_added {
+            self.connectivity.pass();
+        }
+        is_added
     }
 
     /// The tangent linearised at φ on the device; `None` if it does not run there, or a particle has det F ≤ 0.
