@@ -54,7 +54,7 @@ impl InertiaArguments {
     }
 }
 
-/// The part of a linearised step that particles have, on a device.
+/// The tangents and masses of the particles in a linearised step, on a device.
 #[derive(Debug)]
 pub(crate) struct OfParticles {
     pub transfer: Arc<Transfer>,
@@ -89,8 +89,8 @@ impl OfParticles {
         ProductArguments { pass: self.transfer.pass(u, gathers), inertia, sets, rows }
     }
 
-    /// Adds the diagonal blocks of the particles to those at the nodes, which are stored column by column. Returns whether it did; if not,
-    /// `blocks` is as before.
+    /// Adds the diagonal blocks of the particles to those at the nodes, which are stored column by column. Returns whether the blocks were
+    /// added. Otherwise `blocks` is unchanged.
     pub(crate) fn add_diagonal_blocks(&self, blocks: &mut [f64]) -> bool {
         let (gpu, d) = (self.transfer.gpu(), self.transfer.dimension);
         if gpu.check_shared(self.transfer.shared_of_blocks).is_err() {
@@ -108,7 +108,8 @@ impl OfParticles {
         succeeded
     }
 
-    /// Adds the particles to row i of all blocks, for each i. No loop is shared here: its tasks could ask for the locked device.
+    /// Adds the particles to row i of all blocks, for each i. The loop is not shared, because tasks of other simulations could wait here for the
+    /// locked device.
     fn add_rows_of_blocks(&self, rows: &mut [Vec<f64>]) {
         let gpu = self.transfer.gpu();
         let _lock = gpu.lock();

@@ -59,7 +59,7 @@ impl Solids {
         self.transfer.gpu()
     }
 
-    /// Runs `launch` with the particles. Whether all particles have det F > 0, and the device has not failed.
+    /// Runs `launch` with the particles. Returns whether all particles have det F > 0 and the device has not failed.
     fn succeed(&self, launch: impl FnOnce(SolidsArguments)) -> bool {
         let gpu = self.gpu();
         let failed = gpu.copy_of(&[0_u32]);
@@ -76,7 +76,7 @@ impl Solids {
     }
 
     /// `out +=` Σ_p q N_I + σ ∇_r N_I at φ, with σ = V₀ F S F_rᵀ and the inertia of the particles; or Σ_p |σ| |∇_r N_I| if `magnitudes`.
-    /// Returns whether it did; if not, `out` is as before.
+    /// Returns whether the forces were added. Otherwise `out` is unchanged.
     pub(crate) fn add_forces(
         &self,
         inertia: Option<&InertiaOfParticles<'_>>,
@@ -99,7 +99,7 @@ impl Solids {
             transfer.launch(["forces_1", "forces_2", "forces_3"], transfer.shared, &arguments);
             transfer.add_boxes(&start, &mut sums);
         });
-        // A copy that fails may have written a part.
+        // If the copy from the device fails, a part of its numbers may have been written.
         let mut all = vec![0.0; out.len()];
         if succeeded {
             gpu.read_at(&sums, 0, &mut all);

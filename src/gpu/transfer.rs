@@ -109,7 +109,7 @@ pub(crate) struct Transfer {
     boxes: Buffer<f64>,
 }
 
-/// What a pass gathers and scatters: values, gradients, and whether weights are taken by their magnitudes.
+/// The numbers that a pass gathers and scatters: values, gradients, or both. `magnitudes` says whether the scatter takes the magnitudes of all weights.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Gathers {
     pub(super) values: bool,

@@ -1,5 +1,4 @@
-//! A step on a device: its arrays are copied there. Its product runs there, and also its residual and its linearisation if the laws are
-//! formulas.
+//! A step on a device. The product of the tangent runs there. If the laws are formulas, the residual and the linearisation run there, too.
 
 use super::constitutive::Laws;
 use super::sweep::Connectivity;
@@ -36,8 +35,8 @@ impl<const D: usize> Tangent<'_, D> {
         out.copy_from_slice(bytemuck::cast_slice(&gpu.numbers(&y)));
     }
 
-    /// The tangents and masses of the particles on the device of their shape functions, if they have one.
-    pub(super) fn particles_on_device(&self) -> Option<OfParticles> {
+    /// The tangents and masses of the particles on the device, if the shape functions lie on one. `rows` copies the tangents.
+    pub(super) fn particles_on_device(&self, rows: impl FnOnce(&Gpu) -> Vec<gpu::Rows>) -> Option<OfParticles> {
         let transfer: Arc<Transfer> = self.connectivity().on_device()?.clone();
         if self.data.stresses.len() + self.data.cells.len() > gpu::SETS {
             return None;
@@ -47,12 +46,12 @@ impl<const D: usize> Tangent<'_, D> {
             let masses = self.connectivity().masses_on_device(&gpu, |p| mass.particles.mass[p], mass.lumped);
             Inertia { masses, factor, lumping: mass.lumping }
         });
-        Some(OfParticles { inertia, rows: self.data.rows_on_device(&gpu, self.connectivity()), transfer })
+        Some(OfParticles { inertia, rows: rows(&gpu), transfer })
     }
 
-    /// The tangent on the device of its shape functions, if they have one.
+    /// The tangent on the device, if the shape functions lie on one.
     pub(super) fn device_tangent(&self) -> Option<DeviceTangent> {
-        let of_particles = self.particles_on_device()?;
+        let of_particles = self.particles_on_device(|gpu| self.data.rows_on_device(gpu, self.connectivity()))?;
         let gpu = of_particles.transfer.gpu().clone();
         let prescribed: Vec<u8> = self.space.prescribed_mask().into_iter().map(u8::from).collect();
         let followers = self.space.followers().on_device(&gpu);
@@ -79,7 +78,7 @@ impl<const D: usize, L: Law> Laws<'_, D, L> {
         self.bodies.iter().map(|body| Formula::of(&body.law)).collect()
     }
 
-    /// The particles with their laws on the device of their shape functions, if all laws are formulas.
+    /// The particles with their laws on the device, if the shape functions lie on one and all laws are formulas.
     pub(super) fn on_device(&self, connectivity: &Connectivity<D>) -> Option<Solids> {
         let (transfer, formulas) = (connectivity.on_device()?, self.formulas()?);
         let (particles, reference) = (self.particles, self.particles.reference());

@@ -158,7 +158,7 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
         Ok(())
     }
 
-    /// Adds the contributions at the particles, or their magnitudes, on the device. Returns whether it did; if not, `out` is as before.
+    /// Adds the contributions at the particles, or their magnitudes, on the device. Returns whether they were added. Otherwise `out` is unchanged.
     fn add_on_device<T: Number>(
         &self,
         picked: impl Fn(&str, Role) -> bool,

@@ -88,7 +88,7 @@ impl<'a, const D: usize> Tangent<'a, D> {
         self.data.add_blocks_of_functions(&functions, &mut blocks);
         if self.data.has_quadratic(&self.mass) {
             let quadratic = |group: Group<'_>, form: &mut Quadratic| self.data.add_quadratic(&self.mass, group, form);
-            let on_device = self.particles_on_device();
+            let on_device = self.particles_on_device(|gpu| self.data.rows_without_cells_on_device(gpu));
             if !on_device.is_some_and(|particles| particles.add_diagonal_blocks(bytemuck::cast_slice_mut(&mut blocks)))
             {
                 self.connectivity().blocks(&mut blocks, &quadratic);

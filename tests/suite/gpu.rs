@@ -163,8 +163,17 @@ fn random_block(dimension: usize, case: usize) -> Value {
     let averages = case % 4 == 1 && case % materials.len() != 4;
     let body = json!({"name": "block", "density": 2, "shape": {"box": {"min": of(0.5), "max": of(2.25)}},
         "material": materials[case % materials.len()], "volumetric": if averages { "mean_dilatation" } else { "pointwise" }});
+    let mut bodies = vec![body];
+    if case.is_multiple_of(3) {
+        // Groups at the interface have particles of two laws.
+        let [min, max] = [(2.25, 0.5), (3.25, 2.25)].map(|(along, across)| {
+            (0..dimension).map(|axis| if axis == 0 { along } else { across }).collect::<Vec<f64>>()
+        });
+        bodies.push(json!({"name": "other", "density": 3, "shape": {"box": {"min": min, "max": max}},
+            "material": materials[(case + 1) % materials.len()]}));
+    }
     let mut scene = json!({"grid": {"size": of(4.0), "spacing": 0.5}, "time": {"step": 0.01, "end": 1},
-        "approximation": families[case % 6], "aggregation": case % 7 > 3, "bodies": [body], "boundary": {"left": "fixed", "right": "sliding"}});
+        "approximation": families[case % 6], "aggregation": case % 7 > 3, "bodies": bodies, "boundary": {"left": "fixed", "right": "sliding"}});
     if is_dynamic {
         scene["time"]["lumping"] = json!([1.0, 0.4, 0.0][case / 2 % 3]);
         scene["damping"] = json!({"mass": 0.1, "stiffness": if case.is_multiple_of(2) { 0.01 } else { 0.0 }});
@@ -202,6 +211,11 @@ fn compare_equilibria<const D: usize>(gpu: &Arc<Gpu>, case: usize) -> Result<(),
     let phi: Vec<_> = direction::<D>(count, 1).iter().map(|x| x * 0.01).collect();
     assert!(of_processor.residual(&phi)? == equilibrium.residual(&phi)?, "{D}D, case {case}, residual: {scene}");
     assert!(of_processor.magnitude(&phi)? == equilibrium.magnitude(&phi)?, "{D}D, case {case}, magnitude: {scene}");
+    // Cells are turned inside out. Both name the same particle.
+    let inadmissible: Vec<_> = phi.iter().map(|x| x * 1e3).collect();
+    assert_eq!(of_processor.residual(&inadmissible), equilibrium.residual(&inadmissible), "{D}D, case {case}: {scene}");
+    let refused = [&of_processor, &equilibrium].map(|one| one.tangent(None, &inadmissible).err());
+    assert!(refused[0].is_some() && refused[0] == refused[1], "{D}D, case {case}: {refused:?}: {scene}");
     let mut u = direction::<D>(count, 2);
     here.prescribed().iter().for_each(|dof| u[dof.node][dof.component] = 0.0);
     let (tangent, on_gpu) = (of_processor.tangent(None, &phi)?, equilibrium.tangent(None, &phi)?);

@@ -18,7 +18,7 @@
 
 KERNEL(IN_D(PASS), PASS_ARGUMENTS) {
     SHARED(double, shared);
-    const struct Pass *pass = &(PASS_OF_A);
+    const struct Pass *pass = &PASS_OF_A;
     const struct Transfer *transfer = &pass->transfer;
     const struct Box box = box_of(transfer, BLOCK);
     double *nodal = shared, *out = nodal + box.nodes * D, *numbers = out + box.nodes * D;

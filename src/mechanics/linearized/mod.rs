@@ -119,6 +119,12 @@ impl<const D: usize> Linearized<D> {
         stresses.chain(self.cells.iter().map(|cells| cells.on_device(gpu, connectivity))).collect()
     }
 
+    /// The rows of laws and averaged cells on a device, without the coupling of the cells.
+    pub(crate) fn rows_without_cells_on_device(&self, gpu: &Gpu) -> Vec<gpu::Rows> {
+        let rows = self.stresses.iter().chain(self.cells.iter().map(|cells| &cells.rows));
+        rows.map(|rows| rows.on_device(gpu)).collect()
+    }
+
     /// Adds the diagonal blocks of the lumped mass.
     pub(crate) fn add_blocks_at_nodes(&self, mass: &Mass<'_, D>, blocks: &mut [Tensor<f64, D>]) {
         if self.mass != 0.0 {

@@ -39,7 +39,7 @@ impl Copies {
     #[cold]
     fn fetched(&self) -> Pooled<[f64; LANES]> {
         let (Some((gpu, rows, pool)), Some(there)) = (&self.source, self.there.get()) else { return Pooled::default() };
-        // A shared loop could run another task here, which would wait for these rows for ever.
+        // A loop on all cores could take up another task here. That task would wait for these rows for ever.
         let mut here = pool.unspecified(*rows);
         here.fill([f64::NAN; LANES]);
         gpu.read_at(there, 0, here.as_flattened_mut());

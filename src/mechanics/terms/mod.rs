@@ -133,8 +133,8 @@ impl<'a, const D: usize, L: Law> Terms<'a, D, L> {
         self.picked(picked).filter_map(|any| of_term!(any, term => term.at_points(part, at))).collect()
     }
 
-    /// Adds the contributions at the particles, or their magnitudes, of all terms that `picked` selects, if they run on the device. Returns
-    /// whether it did; if not, `out` is as before.
+    /// Adds the contributions at the particles, or their magnitudes, of all terms that `picked` selects, if these terms run on the device.
+    /// Returns whether the contributions were added. Otherwise `out` is unchanged.
     pub(crate) fn add_on_device(
         &self,
         picked: impl Fn(&str, Role) -> bool,

@@ -27,8 +27,8 @@ impl<'a, const D: usize, L: Law> Stress<'a, D, L> {
         &self.laws.bodies[self.laws.particles.body[p] as usize].law
     }
 
-    /// Adds the forces, with the consistent part of inertia if given, or the magnitudes of the forces, on the device. Returns whether it did; if
-    /// not, `out` is as before.
+    /// Adds the forces, with the consistent part of inertia if given, or the magnitudes of the forces, on the device. Returns whether the forces
+    /// were added. Otherwise `out` is unchanged.
     pub(super) fn add_on_device(
         &self,
         inertia: Option<&Inertia<'_, D>>,
@@ -45,7 +45,7 @@ impl<'a, const D: usize, L: Law> Stress<'a, D, L> {
         is_added
     }
 
-    /// The tangent linearised at φ on the device; `None` if it does not run there, or a particle has det F ≤ 0.
+    /// The tangent linearised at φ on the device; `None` if the laws do not run there, or a particle has det F ≤ 0.
     fn linearized_on_device(&self, phi: &[Vector<f64, D>], part: Part, form: Form) -> Option<TangentRows> {
         if part != Part::Whole || form == Form::General {
             return None;
