@@ -293,6 +293,18 @@ impl Gpu {
         _ = self.keep("a copy from the device", copied.and_then(|()| self.stream.synchronize()));
     }
 
+    /// Copies a buffer to `numbers`, all or none. Returns whether the device has not failed.
+    pub(crate) fn read_all<T: DeviceNumber>(&self, buffer: &Buffer<T>, numbers: &mut [T]) -> bool {
+        // If a copy fails, a part of its numbers may have been written.
+        let mut all = vec![T::zeroed(); numbers.len()];
+        self.read_at(buffer, 0, &mut all);
+        let succeeded = self.check().is_ok();
+        if succeeded {
+            numbers.copy_from_slice(&all);
+        }
+        succeeded
+    }
+
     /// Calls `fill` with memory for `count` partial sums, and adds them in their order; NaN after a failure.
     pub(super) fn sum(&self, count: usize, fill: impl FnOnce(u64)) -> f64 {
         let (on_device, numbers) = &mut *held(&self.partial);

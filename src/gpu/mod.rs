@@ -11,6 +11,7 @@ mod copies;
 mod device;
 mod followers;
 mod multigrid;
+mod passes;
 mod points;
 mod product;
 mod rows;

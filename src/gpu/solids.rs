@@ -99,23 +99,15 @@ impl Solids {
             transfer.launch(["forces_1", "forces_2", "forces_3"], transfer.shared, &arguments);
             transfer.add_boxes(&start, &mut sums);
         });
-        // If the copy from the device fails, a part of its numbers may have been written.
-        let mut all = vec![0.0; out.len()];
-        if succeeded {
-            gpu.read_at(&sums, 0, &mut all);
-        }
-        let succeeded = succeeded && gpu.check().is_ok();
-        if succeeded {
-            out.copy_from_slice(&all);
-        }
-        succeeded
+        succeeded && gpu.read_all(&sums, out)
     }
 
     /// The tangents at φ in a closed form, with `count` rows a group; `None` if a particle has det F ≤ 0, or the device fails.
     pub(crate) fn linearized(&self, count: usize, phi: &[f64]) -> Option<Buffer<f64>> {
         let (gpu, transfer) = (self.gpu(), &self.transfer);
         let phi = gpu.copy_of(phi);
-        let rows = gpu.memory_for(self.of_particles.bodies.len() * count);
+        let mut rows = gpu.memory_for(self.of_particles.bodies.len() * count);
+        gpu.clear(&mut rows);
         let succeeded = self.succeed(|solids| {
             // `Linearize` of `kernels/data.h`.
             let arguments = arguments! {

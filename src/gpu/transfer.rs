@@ -27,10 +27,12 @@ pub(crate) struct TransferArrays {
     pub box_first: Vec<u32>,
     /// Nodes of each box along the three axes.
     pub size: Vec<u32>,
-    /// Of each group: the first row of its weights, the first node of its window as a place in the box, and its widths and lanes, a byte each.
+    /// Of each group: the first row of its weights, the first node of its window as a place in the box, its widths and lanes, a byte each, and
+    /// its first particle in the order of the passes.
     pub weights_first: Vec<u32>,
     pub window_first: Vec<u32>,
     pub window_shape: Vec<u32>,
+    pub particle_first: Vec<u32>,
     /// Of each active node of a block: its number, and its place in the box.
     pub nodes: Vec<u32>,
     pub places: Vec<u32>,
@@ -48,7 +50,8 @@ impl TransferArrays {
     /// Bytes on a device, with the entries of the nodes and the boxes, without the weights.
     pub(crate) fn bytes(&self) -> usize {
         let lists = [&self.group_first, &self.node_first, &self.box_first, &self.size, &self.weights_first];
-        let more = [&self.window_first, &self.window_shape, &self.nodes, &self.places, &self.nodes];
+        let more =
+            [&self.window_first, &self.window_shape, &self.particle_first, &self.nodes, &self.places, &self.nodes];
         let numbers: usize = lists.into_iter().chain(more).map(Vec::len).sum::<usize>() + self.nodal + 1;
         let places = self.box_first.last().map_or(0, |&places| places as usize);
         numbers * size_of::<u32>() + places * self.dimension * size_of::<f64>()
@@ -104,7 +107,7 @@ pub(crate) struct Transfer {
     pub(super) shared_of_blocks: usize,
     window: LargestWindow,
     /// The arrays of [`TransferArrays`], then the entries of the nodes.
-    arrays: [Buffer<u32>; 11],
+    arrays: [Buffer<u32>; 12],
     weights: Buffer<f64>,
     boxes: Buffer<f64>,
 }
@@ -149,7 +152,7 @@ pub(super) struct NodalSums {
 #[derive(Clone, Copy)]
 #[repr(C)]
 pub(super) struct TransferArguments {
-    before_weights: [u64; 7],
+    before_weights: [u64; 8],
     weights: u64,
     after_weights: [u64; 4],
 }
@@ -185,6 +188,7 @@ impl Transfer {
             &a.weights_first,
             &a.window_first,
             &a.window_shape,
+            &a.particle_first,
             &a.nodes,
             &a.places,
             entry_first,
@@ -243,7 +247,7 @@ impl Transfer {
 
     /// Sums the contributions at the nodes to the address `y`.
     pub(super) fn sum_at_nodes(&self, sums: NodalSums, y: u64) {
-        let [entry_first, entries] = [9, 10].map(|k| self.arrays[k].address());
+        let [entry_first, entries] = [10, 11].map(|k| self.arrays[k].address());
         let n = self.nodal * self.dimension;
         // `Nodes` of `kernels/data.h`.
         let arguments = arguments! { entry_first, entries, sums, y, n: n as i64, dimension: self.dimension as i32 };
@@ -255,7 +259,7 @@ impl Transfer {
         TransferArguments {
             before_weights: std::array::from_fn(at),
             weights: self.weights.address(),
-            after_weights: std::array::from_fn(|k| at(7 + k)),
+            after_weights: std::array::from_fn(|k| at(8 + k)),
         }
     }
 }

@@ -48,7 +48,7 @@ pub(super) struct Run {
     /// Threads, 1 to 1024 [default: all cores; one in each of several processes]. Results are bitwise identical for any number of threads.
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1, parallel::MOST_THREADS))]
     threads: Option<u64>,
-    /// Run Newton's method on a GPU, an NVIDIA device of compute capability 8 or higher. Results are bitwise identical.
+    /// Run Newton's method and the transfers on a GPU, an NVIDIA device of compute capability 8 or higher. Results are bitwise identical.
     #[arg(long)]
     gpu: bool,
     /// Compare the tangent with dual numbers every EVERY steps, and stop if they differ.

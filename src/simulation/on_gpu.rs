@@ -1,4 +1,4 @@
-//! Newton's method on a GPU, and the parts of a simulation that do not run there yet.
+//! A simulation on a GPU, and the parts of a simulation that do not run there yet.
 
 use super::Simulation;
 use crate::approximation::ShapeFunction;
@@ -8,7 +8,7 @@ use crate::mechanics::sweep::WIDEST;
 use std::sync::Arc;
 
 impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
-    /// Runs Newton's method of all further steps on the GPU of this machine, which is returned.
+    /// Runs Newton's method and the transfers of all further steps on the GPU of this machine, which is returned.
     ///
     /// ```
     /// use bfree::gpu::GpuError;
@@ -31,7 +31,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         Ok(gpu)
     }
 
-    /// Whether Newton's method can run on a GPU.
+    /// Whether the simulation can run on a GPU.
     ///
     /// # Errors
     /// The first part that cannot.
@@ -43,6 +43,9 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
                 return refused("functions of more than 16 nodes an axis do", "take a larger gamma");
             }
             Some(_) => {}
+        }
+        if self.settings.processes.are_several() {
+            return refused("several processes do", "start one process");
         }
         if self.is_mixed() {
             let cure = "set solver.krylov.preconditioner to \"block_jacobi\"";

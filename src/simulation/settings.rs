@@ -55,7 +55,7 @@ pub struct Settings {
     pub error_tolerance: Option<f64>,
     /// The tangent is compared with dual numbers at the end of every so many steps.
     pub check_tangent: Option<NonZeroU64>,
-    /// The device on which Newton's method runs; `None` for the processor.
+    /// The device on which Newton's method and the transfers run; `None` for the processor.
     pub gpu: Option<Arc<Gpu>>,
     /// The processes that share the passes over the particles.
     pub processes: Processes,

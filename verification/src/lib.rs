@@ -13,6 +13,8 @@
 pub mod axis;
 mod check;
 #[cfg(feature = "studies")]
+pub mod device;
+#[cfg(feature = "studies")]
 pub mod double_double;
 #[cfg(feature = "studies")]
 pub mod known;

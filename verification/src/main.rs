@@ -10,10 +10,11 @@ use std::process::ExitCode;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc;
 use std::time::{Instant, SystemTime};
+use verification::device;
 use verification::known::may_list;
 use verification::record::{self, Finding, Run};
 use verification::report::{chain, stop_at_failures};
-use verification::studies::{Effort, MEASURE_TIME, Outcome, PAPER, STUDIES, Study, StudyError};
+use verification::studies::{Effort, MEASURE_TIME, ON_DEVICE, Outcome, PAPER, STUDIES, Study, StudyError};
 
 /// Verification of bfree.
 #[derive(Parser)]
@@ -31,6 +32,9 @@ struct Arguments {
     /// Stop at the first cell that fails; `mutants`, whose cells must fail, continues
     #[arg(long)]
     first: bool,
+    /// Solve linear systems on the GPU of this machine; the studies tangent and newton can
+    #[arg(long)]
+    gpu: bool,
     /// Write every cell, table and remark as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -91,6 +95,10 @@ fn main() -> ExitCode {
             return ExitCode::from(2);
         }
     };
+    if let Err(refusal) = open_device(&studies, &arguments) {
+        eprintln!("error: {refusal}");
+        return ExitCode::from(2);
+    }
     match run(&studies, &arguments) {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::from(1),
@@ -100,6 +108,19 @@ fn main() -> ExitCode {
             eprintln!("error: {}", chain(&error));
             ExitCode::from(1)
         }
+    }
+}
+
+/// Opens the GPU, if the studies are to use one.
+fn open_device(studies: &[(&'static Study, Effort)], arguments: &Arguments) -> Result<(), String> {
+    if !arguments.gpu {
+        return Ok(());
+    }
+    match studies.iter().find(|(study, _)| !ON_DEVICE.contains(&study.name)) {
+        Some((study, _)) => {
+            Err(format!("--gpu: {} does not run there; these studies do: {}", study.name, ON_DEVICE.join(", ")))
+        }
+        None => device::open().map_err(|error| error.to_string()),
     }
 }
 

@@ -1,5 +1,6 @@
 //! The scenes that come with the program.
 
+use crate::device;
 use crate::studies::StudyError;
 use bfree::scene::{self, Override, Scene};
 use bfree::simulation::Simulation;
@@ -40,5 +41,7 @@ pub fn scene(name: &str, overrides: &[impl AsRef<str>]) -> Result<Scene, StudyEr
 /// # Errors
 /// As for [`scene()`], or a scene that cannot be built.
 pub fn simulation<const D: usize>(name: &str, overrides: &[impl AsRef<str>]) -> Result<Simulation<D>, StudyError> {
-    Ok(scene(name, overrides)?.build(&folder())?)
+    let mut simulation = scene(name, overrides)?.build(&folder())?;
+    simulation.settings.gpu = device::used();
+    Ok(simulation)
 }

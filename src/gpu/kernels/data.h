@@ -31,10 +31,12 @@ struct Transfer {
     const u32 *node_first;
     const u32 *box_first;
     const u32 *size;
-    // Of each group: its first row of weights, the place of its first node in the box, and its widths and lanes, a byte each.
+    // Of each group: its first row of weights, the place of its first node in the box, its widths and lanes, a byte each, and its first particle.
+    // Particles are numbered in the order of the passes.
     const u32 *weights_first;
     const u32 *window_first;
     const u32 *window_shape;
+    const u32 *particle_first;
     // Rows of eight weights: for each group and axis N of all nodes, then N'.
     const double *weights;
     // Of each node of a block: its number, and its place in the box.
@@ -158,6 +160,22 @@ struct Volumes {
     double *volumes;
     int count;
     int first_of_b;
+};
+
+// A nodal field at all particles, in the order of the passes: values, or gradients by columns.
+struct AtParticles {
+    struct Transfer transfer;
+    const double *u;
+    double *results;
+    int gradients;
+};
+
+// Forces of all particles, in the order of the passes.
+struct Spread {
+    struct Pass pass;
+    const double *forces;
+    // Numbers of a force: the first components.
+    int components;
 };
 
 struct Box {

@@ -195,7 +195,7 @@ FUNCTION void IN_D(force)(const struct Forces *a, i64 group, int lane, const dou
 }
 
 // The tangent of a particle in the closed form, as rows of the lane. Rows behind those of its law are zero.
-FUNCTION void IN_D(linearized)(const struct Linearize *a, i64 group, int lane, const double l[D][D]) {
+FUNCTION void IN_D(linearized)(const struct Linearize *a, i64 group, int lane, const double *u, const double l[D][D]) {
     const double *state = a->solids.states + group * (D * D + 1) * LANES + lane, volume = state[D * D * LANES];
     const u32 body = a->solids.bodies[group * LANES + lane];
     const double *constants = a->solids.constants + 2 * body;
@@ -204,6 +204,12 @@ FUNCTION void IN_D(linearized)(const struct Linearize *a, i64 group, int lane, c
     IN_D(deform)(&a->solids, state, l, h, f_r, &v);
     for (int k = D * D + PAIRS + 2; k < a->count; k++) rows[k * LANES] = 0.0;
     OF_LAW(a->solids.laws[body], tangent, h, &v, f_r, volume, constants, rows)
+}
+
+// A given force of a particle.
+FUNCTION void IN_D(force_of)(const struct Spread *a, i64 group, int lane, double *out) {
+    const i64 particle = a->pass.transfer.particle_first[group] + lane;
+    for (int c = 0; c < a->components; c++) out[c] = a->forces[particle * a->components + c];
 }
 
 // Row i of 𝔸_kl + 𝔸_lk for all pairs k < l, and of 𝔸_kk.
@@ -344,31 +350,49 @@ FUNCTION void IN_D(load_box)(const struct Transfer *a, u32 block, int t, const d
         for (int c = 0; c < D; c++) nodal[a->places[i] * D + c] = u[(i64)a->nodes[i] * D + c];
 }
 
-// The changes of volume of the particles of averaged cells: b : L.
-KERNEL(IN_D(volumes), Volumes) {
-    SHARED(double, nodal);
-    const struct Box box = box_of(&a.transfer, BLOCK);
-    PHASE(t) {
-        for (int i = t; i < box.nodes * D; i += THREADS) nodal[i] = 0.0;
+// A kernel that calls POINT(a, group, lane, u, L) for all particles.
+#define GATHER_KERNEL(name, Arguments, POINT)                                                                          \
+    KERNEL(IN_D(name), Arguments) {                                                                                    \
+        SHARED(double, nodal);                                                                                         \
+        const struct Transfer *transfer = &a.transfer;                                                                 \
+        const struct Box box = box_of(transfer, BLOCK);                                                                \
+        PHASE(t) {                                                                                                     \
+            for (int i = t; i < box.nodes * D; i += THREADS) nodal[i] = 0.0;                                           \
+        }                                                                                                              \
+        PHASE(t) { IN_D(load_box)(transfer, BLOCK, t, a.u, nodal); }                                                   \
+        const u32 first = transfer->group_first[BLOCK] * LANES, end = transfer->group_first[BLOCK + 1] * LANES;        \
+        PHASE(t) {                                                                                                     \
+            for (u32 slot = first + t; slot < end; slot += THREADS) {                                                  \
+                const u32 group = slot / LANES;                                                                        \
+                const int lane = slot % LANES;                                                                         \
+                if (lane >= lanes_of(transfer, group)) continue;                                                       \
+                const struct Window w = window_of(transfer, &box, group, lane, D);                                     \
+                double u[D], l[D][D];                                                                                  \
+                IN_D(gather)(nodal, &w, u, l);                                                                         \
+                POINT(&a, group, lane, u, l);                                                                          \
+            }                                                                                                          \
+        }                                                                                                              \
     }
-    PHASE(t) { IN_D(load_box)(&a.transfer, BLOCK, t, a.u, nodal); }
-    const u32 first = a.transfer.group_first[BLOCK] * LANES, end = a.transfer.group_first[BLOCK + 1] * LANES;
-    PHASE(t) {
-        for (u32 slot = first + t; slot < end; slot += THREADS) {
-            const u32 group = slot / LANES;
-            const int lane = slot % LANES;
-            double sum = 0.0;
-            if (lane < lanes_of(&a.transfer, group)) {
-                const struct Window w = window_of(&a.transfer, &box, group, lane, D);
-                const double *b = a.rows + ((i64)group * a.count + a.first_of_b) * LANES + lane;
-                double u[D], l[D][D];
-                IN_D(gather)(nodal, &w, u, l);
-                for (int k = 0; k < D * D; k++) sum += b[k * LANES] * l[k / D][k % D];
-            }
-            a.volumes[slot] = sum;
-        }
-    }
+
+// The change of volume of a particle of an averaged cell: b : L.
+FUNCTION void IN_D(volume)(const struct Volumes *a, i64 group, int lane, const double *u, const double l[D][D]) {
+    const double *b = a->rows + (group * a->count + a->first_of_b) * LANES + lane;
+    double sum = 0.0;
+    for (int k = 0; k < D * D; k++) sum += b[k * LANES] * l[k / D][k % D];
+    a->volumes[group * LANES + lane] = sum;
 }
+
+// u or L of a particle.
+FUNCTION void IN_D(at_particle)(const struct AtParticles *a, i64 group, int lane, const double *u, const double l[D][D]) {
+    const i64 particle = a->transfer.particle_first[group] + lane;
+    for (int k = 0; k < D * D && a->gradients; k++) a->results[particle * D * D + k] = l[k % D][k / D];
+    for (int c = 0; c < D && !a->gradients; c++) a->results[particle * D + c] = u[c];
+}
+
+GATHER_KERNEL(volumes, Volumes, IN_D(volume))
+GATHER_KERNEL(at_particles, AtParticles, IN_D(at_particle))
+// The tangents of all particles. Rows of empty lanes are not written.
+GATHER_KERNEL(linearize, Linearize, IN_D(linearized))
 
 // K u, without lumped masses.
 #define PASS product
@@ -400,35 +424,20 @@ KERNEL(IN_D(volumes), Volumes) {
 #define PASS_SCATTER(...) IN_D(scatter)(&a.pass, a.pass.magnitudes, __VA_ARGS__)
 #include "pass.h"
 
-// The tangents of all particles.
-KERNEL(IN_D(linearize), Linearize) {
-    SHARED(double, nodal);
-    const struct Transfer *transfer = &a.transfer;
-    const struct Box box = box_of(transfer, BLOCK);
-    PHASE(t) {
-        for (int i = t; i < box.nodes * D; i += THREADS) nodal[i] = 0.0;
-    }
-    PHASE(t) { IN_D(load_box)(transfer, BLOCK, t, a.u, nodal); }
-    const u32 first = transfer->group_first[BLOCK] * LANES, end = transfer->group_first[BLOCK + 1] * LANES;
-    PHASE(t) {
-        for (u32 slot = first + t; slot < end; slot += THREADS) {
-            const u32 group = slot / LANES;
-            const int lane = slot % LANES;
-            if (lane >= lanes_of(transfer, group)) {
-                for (int k = 0; k < a.count; k++) a.rows[((i64)group * a.count + k) * LANES + lane] = 0.0;
-                continue;
-            }
-            const struct Window w = window_of(transfer, &box, group, lane, D);
-            double u[D], l[D][D];
-            IN_D(gather)(nodal, &w, u, l);
-            IN_D(linearized)(&a, group, lane, l);
-        }
-    }
-}
+// Σ q N_I of forces q.
+#define PASS spread
+#define PASS_ARGUMENTS Spread
+#define PASS_OF_A a.pass
+#define PASS_NUMBERS D
+#define PASS_GATHERS 0
+#define PASS_POINT(group, lane, u, l, out) IN_D(force_of)(&a, group, lane, out)
+#define PASS_SCATTER(...) IN_D(scatter)(&a.pass, a.pass.magnitudes, __VA_ARGS__)
+#include "pass.h"
 
 #undef NUMBERS
 #undef PAIRS
 #undef GATHER_TILE
+#undef GATHER_KERNEL
 #undef OF_LAW
 #undef IN_D
 #undef JOIN

@@ -57,7 +57,7 @@ pub struct Connectivity<const D: usize> {
     pool: Pool,
     /// The extension u = E û by which outer nodes follow inner ones; `None` where every node is an unknown.
     extension: Option<Arc<Extension>>,
-    /// The device on which Newton's method runs.
+    /// The device on which Newton's method and the transfers run.
     pub(super) gpu: Option<Arc<Gpu>>,
     /// Copies in its memory.
     pub(super) copies: Copies,

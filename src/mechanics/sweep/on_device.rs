@@ -2,9 +2,12 @@
 
 use super::group::{At, Group};
 use super::tiled::Tiled;
-use super::{Connectivity, Each, Mode};
+use super::{Connectivity, Each, Mode, Weights};
 use crate::gpu::{Buffer, Gpu, Masses, States, Transfer, TransferArrays};
 use crate::lanes::LANES;
+use crate::parallel;
+use crate::pooled::{Element, Pooled};
+use crate::tensor::Vector;
 use bytemuck::Pod;
 use std::sync::Arc;
 
@@ -15,14 +18,50 @@ impl<const D: usize> Connectivity<D> {
         self
     }
 
-    /// The shape functions on the device; `None` without a device, or for the plain loop.
+    /// The shape functions on the device; `None` without a device, for the plain loop, and if several processes share the passes.
     pub(crate) fn on_device(&self) -> Option<&Arc<Transfer>> {
-        let (gpu, tiled) = (self.gpu.as_ref()?, self.tiled()?);
+        let (gpu, tiled) = (self.gpu.as_ref()?, self.tiled().filter(|tiled| tiled.shares.is_none())?);
         let copied = || {
             let weights = tiled.blocks.iter().map(|block| block.weights.as_slice());
             Arc::new(Transfer::new(gpu.clone(), &tiled.arrays(self.nodes.len()), weights))
         };
         Some(self.copies.transfer.get_or_init(copied))
+    }
+
+    /// Writes Σ u_I N_I at all particles, or Σ u_I ⊗ ∇N_I, in the order of the passes. Returns whether a device has done so.
+    pub(super) fn gather_on_device<X: Element, const C: usize>(
+        &self,
+        mode: Mode,
+        field: &[Vector<f64, C>],
+        results: &mut [X],
+    ) -> bool {
+        let Some(transfer) = self.on_device().filter(|_| C == D) else { return false };
+        transfer.gather(mode.gradient, bytemuck::cast_slice(field), bytemuck::cast_slice_mut(results))
+    }
+
+    /// `out += Σ_p value(p) N_I` with the given weights in place of N. Returns whether a device has done so.
+    pub(super) fn spread_on_device<const C: usize>(
+        &self,
+        weights: Weights,
+        out: &mut [Vector<f64, C>],
+        value: &(dyn Fn(usize) -> Vector<f64, C> + Sync),
+    ) -> bool {
+        let Some((transfer, tiled)) = self.on_device().zip(self.tiled()).filter(|_| weights != Weights::Square) else {
+            return false;
+        };
+        let mut forces: Pooled<Vector<f64, C>> = self.pool().unspecified(self.particles());
+        let evaluate = |group: Group<'_>, _: &[At<f64, D, D>], forces: &mut [Vector<f64, C>]| {
+            group.particles.iter().zip(forces).for_each(|(&p, force)| *force = value(p as usize));
+        };
+        tiled.results(Each::Particle, 0, None, Mode::BOTH, &evaluate, &mut forces);
+        let mut sums: Pooled<Vector<f64, D>> =
+            self.pool().made(out.len(), |node| Vector::from_fn(|c, _| out[node].get(c).copied().unwrap_or(0.0)));
+        let magnitudes = weights == Weights::Magnitude;
+        let spread = transfer.spread(C, magnitudes, bytemuck::cast_slice(&forces), bytemuck::cast_slice_mut(&mut sums));
+        if spread {
+            parallel::zip(out, &sums, |out, sum| (0..C).for_each(|c| out[c] = sum[c]));
+        }
+        spread
     }
 
     /// The masses of particles and nodes on the device.
@@ -92,7 +131,10 @@ impl<const D: usize> Tiled<D> {
             arrays.node_first.push(arrays.nodes.len() as u32);
             arrays.box_first.push(places);
             arrays.size.extend(block.size.map(|nodes| nodes as u32));
+            let mut particle = block.start;
             for window in &block.windows {
+                arrays.particle_first.push(particle);
+                particle += u32::from(window.lanes);
                 arrays.weights_first.push(rows + window.weights);
                 arrays.window_first.push(window.first);
                 let [x, y, z] = window.width;

@@ -154,6 +154,9 @@ impl<const D: usize> Connectivity<D> {
         out: &mut [Vector<f64, C>],
         value: impl Fn(usize) -> Vector<f64, C> + Sync,
     ) {
+        if self.spread_on_device(weights, out, &value) {
+            return self.pass();
+        }
         self.sweep(None, Mode { weights, ..Mode::VALUE }, out, |group, _, sums| {
             for (lane, &p) in group.particles.iter().enumerate() {
                 let value = value(p as usize);
@@ -191,16 +194,22 @@ impl<const D: usize> Connectivity<D> {
         mode: Mode,
         point: impl Fn(&At<f64, C, D>, usize) -> X + Sync,
     ) -> Pooled<X> {
-        let (field, own) = (bytemuck::cast_slice(field), self.own_places());
-        let point = |_: usize, at: &[At<f64, C, D>], lane: usize| point(&at[0], lane);
+        let own = self.own_places();
+        let fill = |results: &mut [X]| {
+            if self.gather_on_device(mode, field, results) {
+                return self.pass();
+            }
+            let point = |_: usize, at: &[At<f64, C, D>], lane: usize| point(&at[0], lane);
+            self.at_own_particles(1, bytemuck::cast_slice(field), mode, results, point);
+        };
         // If particles do not lie in the order of the passes, every process needs all of them.
         if own_alone && self.is_memory_order() {
             let mut results = self.pool().unspecified(own.len());
-            self.at_own_particles(1, field, mode, &mut results, point);
+            fill(&mut results);
             return results;
         }
         let mut results = self.pool().unspecified(self.particles());
-        self.at_own_particles(1, field, mode, &mut results[own], point);
+        fill(&mut results[own]);
         let count = size_of::<X>() / size_of::<f64>();
         self.in_memory_order(&mut results, |tiled, results| {
             tiled.share_numbers(Each::Particle, count, bytemuck::cast_slice_mut(results));

@@ -70,6 +70,9 @@ pub const PAPER: &[&str] = &["riemann", "compaction", "rebound"];
 /// The studies that measure time.
 pub const MEASURE_TIME: &[&str] = &["baseline", "rebound", "tradeoff", "mutants"];
 
+/// The studies that can solve their linear systems on a GPU.
+pub const ON_DEVICE: &[&str] = &["tangent", "newton"];
+
 /// The name of a law in a narrow column.
 fn short(name: &str) -> String {
     name.trim_start_matches("neo-Hookean, ").replace("St. Venant", "St.V.")

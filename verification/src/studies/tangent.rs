@@ -4,6 +4,7 @@
 use super::{Effort, Outcome, StudyError, short};
 use crate::check::regime::Regime;
 use crate::check::tangent::{POTENTIAL, PRESSURE_ASYMMETRY, SYMMETRY, measure};
+use crate::device;
 use crate::random::Random;
 use crate::report::{Bound, Report};
 use bfree::approximation::Approximation;
@@ -219,7 +220,7 @@ pub(super) fn cloud<const D: usize, L: Law>(
             damping: Some(Rayleigh { mass: 0.4 / dt, stiffness: 0.3 * dt }),
             ..Loads::default()
         }, // Not a half, where ε and 1 − ε are the same.
-        settings: Settings { lumping: 0.3, ..Settings::default() },
+        settings: Settings { lumping: 0.3, gpu: device::used(), ..Settings::default() },
         ..Simulation::new(grid, approximation, bodies, particles, Clock::new(dt, 0))
     })
 }
