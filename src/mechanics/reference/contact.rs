@@ -39,7 +39,8 @@ pub(crate) fn reached_conditions<const D: usize>(
                 |&(cell, field): &(u64, u32)| corners(grid.index(cell)).flat_map(holders).map(move |one| (field, one));
             part.iter().flat_map(conditions).collect()
         };
-        parallel::collect(cells(at_reset, &field, grid).chunks(CELLS), &of_part).into_iter().flatten().collect()
+        let cells = cells(at_reset, &|p| Some(field(p)), grid);
+        parallel::collect(cells.chunks(CELLS), &of_part).into_iter().flatten().collect()
     });
     // The conditions of a cell, by condition and field, and whether a node there is not active yet.
     let conditions = |&(cell, field): &(u64, u32)| -> Vec<((u32, usize), bool)> {
@@ -50,7 +51,9 @@ pub(crate) fn reached_conditions<const D: usize>(
         };
         corners(grid.index(cell)).flat_map(of_node).collect()
     };
-    let keys = cells(present, &field, grid);
+    // A particle in the cell of the last grid reset has reached nothing.
+    let moved = |p: usize| (grid.cell(&present[p]) != grid.cell(&at_reset[p])).then(|| field(p));
+    let keys = cells(present, &moved, grid);
     let of_part = |part: &[(u64, u32)]| -> Vec<_> {
         part.iter().map(|key| (*key, conditions(key))).filter(|(_, all)| !all.is_empty()).collect()
     };
@@ -107,7 +110,7 @@ fn pair(one: u32, other: u32) -> [u32; 2] {
 /// The bodies in the cells around each node.
 fn seen<const D: usize>(position: &[Vector<f64, D>], body: &[u32], grid: &Grid<D>) -> HashMap<u64, BTreeSet<u32>> {
     let mut seen: HashMap<u64, BTreeSet<u32>> = HashMap::new();
-    for (cell, body) in cells(position, &|p| body[p], grid) {
+    for (cell, body) in cells(position, &|p| Some(body[p]), grid) {
         for index in corners(grid.index(cell)) {
             seen.entry(grid.id(index)).or_default().insert(body);
         }
@@ -146,15 +149,18 @@ pub(crate) fn touch<const D: usize>(particles: &Particles<D>, connectivity: &Con
     of_nodes.any(|(weight, mean, square)| weight * square - mean * mean > ALONE * weight * square)
 }
 
-/// The pairs of a cell's id and an item in that cell, sorted, each pair once.
+/// The pairs of a cell's id and the item of a particle in that cell, sorted, each pair once. Particles without an item are left out.
 fn cells<const D: usize, T: Ord + Copy + Send>(
     position: &[Vector<f64, D>],
-    item: &(dyn Fn(usize) -> T + Sync),
+    item: &(dyn Fn(usize) -> Option<T> + Sync),
     grid: &Grid<D>,
 ) -> Vec<(u64, T)> {
     let of_part = |part: Range<usize>| {
-        let own = part.filter_map(|p| Some((grid.id(grid.cell(&position[p])?), item(p))));
-        let mut cells: Vec<_> = own.collect();
+        let own = |p: usize| {
+            let item = item(p)?;
+            Some((grid.id(grid.cell(&position[p])?), item))
+        };
+        let mut cells: Vec<_> = part.filter_map(own).collect();
         // Particles of a cell follow each other.
         cells.dedup();
         cells

@@ -4,6 +4,7 @@
 
 use super::form::LocalForm;
 use crate::gpu::{self, Gpu};
+use crate::lanes::{Lanes, WithLanes, widest};
 use crate::parallel;
 use crate::pooled::Pool;
 use crate::tensor::{Tensor, Vector};
@@ -97,10 +98,11 @@ impl Lines {
         });
         parallel::for_each(parts, &|(lengths, nodes, mut x): (&[u32], &[u32], &mut [Vector<f64, D>])| {
             fill(nodes, x);
-            let mut scratch = [Vec::new(), Vec::new()];
+            let mut scratch = Scratch::default();
             for &length in lengths {
                 if let Some(line) = x.split_off_mut(..length as usize) {
-                    (0..times).for_each(|_| invert(line, &mut scratch));
+                    let line = bytemuck::cast_slice_mut(line);
+                    (0..times).for_each(|_| widest(Invert::<D> { x: line, scratch: &mut scratch }));
                 }
             }
         });
@@ -114,28 +116,45 @@ fn coefficients() -> [f64; 3] {
     [theta, theta / delta, delta]
 }
 
-/// x ← q(B) x with B = [1 4 1]/6 along a line, and the polynomial q ≈ 1/B.
-fn invert<const D: usize>(x: &mut [Vector<f64, D>], [r, p]: &mut [Vec<Vector<f64, D>>; 2]) {
-    let [theta, sigma, delta] = coefficients();
-    let mut rho = 1.0 / sigma;
-    r.clear();
-    r.extend_from_slice(x);
-    x.iter_mut().for_each(|x| *x /= theta);
-    p.clear();
-    p.extend_from_slice(x);
-    for _ in 1..STEPS {
-        // r −= B p
-        for (i, r) in r.iter_mut().enumerate() {
-            let before = i.checked_sub(1).and_then(|before| p.get(before));
-            let others = before.into_iter().chain(p.get(i + 1)).fold(Vector::zeros(), |sum: Vector<f64, D>, p| sum + p);
-            *r -= (p[i] * 4.0 + others) / 6.0;
+/// Working memory of one thread: the residual along a line, and the direction with a zero node before and behind the line.
+#[derive(Default)]
+struct Scratch {
+    r: Vec<f64>,
+    p: Vec<f64>,
+}
+
+/// x ← q(B) x with B = [1 4 1]/6 along a line of nodes with D components, and the polynomial q ≈ 1/B.
+struct Invert<'a, const D: usize> {
+    x: &'a mut [f64],
+    scratch: &'a mut Scratch,
+}
+
+impl<const D: usize> WithLanes for Invert<'_, D> {
+    #[inline(always)]
+    fn run<S: Lanes>(self, _: S) {
+        let Self { x, scratch: Scratch { r, p } } = self;
+        let [theta, sigma, delta] = coefficients();
+        let (mut rho, count) = (1.0 / sigma, x.len());
+        r.clear();
+        r.extend_from_slice(x);
+        x.iter_mut().for_each(|x| *x /= theta);
+        p.clear();
+        p.resize(count + 2 * D, 0.0);
+        p[D..D + count].copy_from_slice(x);
+        for _ in 1..STEPS {
+            // r −= B p
+            let neighbours = p[..count].iter().zip(&p[2 * D..]);
+            for ((r, p), (before, behind)) in r.iter_mut().zip(&p[D..]).zip(neighbours) {
+                // The zero makes a negative zero positive.
+                *r -= (p * 4.0 + (0.0 + before + behind)) / 6.0;
+            }
+            let next = 1.0 / (2.0 * sigma - rho);
+            for ((x, p), r) in x.iter_mut().zip(&mut p[D..]).zip(&*r) {
+                *p = *p * (next * rho) + r * (2.0 * next / delta);
+                *x += *p;
+            }
+            rho = next;
         }
-        let next = 1.0 / (2.0 * sigma - rho);
-        for ((x, p), r) in x.iter_mut().zip(&mut *p).zip(&*r) {
-            *p = *p * (next * rho) + r * (2.0 * next / delta);
-            *x += &*p;
-        }
-        rho = next;
     }
 }
 
