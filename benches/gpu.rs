@@ -47,9 +47,9 @@ fn main() -> Result<(), Box<dyn Error>> {
             let start = Instant::now();
             simulation.advance().map(|_| start.elapsed().as_secs_f64())
         };
-        let on_processor = seconds(&mut simulation)?;
-        simulation.settings.gpu = Some(gpu.clone());
-        let on_gpu = seconds(&mut simulation)?;
+        let mut there = simulation.clone();
+        there.settings.gpu = Some(gpu.clone());
+        let (on_processor, on_gpu) = (seconds(&mut simulation)?, seconds(&mut there)?);
         let same = if same { "yes" } else { "no" };
         println!(
             "{name:11} {same:9}  {product:8.2}, {iteration:8.2} ({targets})  {here:10.4}  {on_processor:8.2}, {on_gpu:8.2}"

@@ -3,7 +3,7 @@
 use crate::parallel::{self, held};
 use bytemuck::Pod;
 use bytemuck::allocation::try_cast_vec;
-use nalgebra::SMatrix;
+use nalgebra::{SMatrix, SVector};
 use std::fmt::{Debug, Formatter};
 use std::ops::{Deref, DerefMut};
 use std::sync::{Arc, Mutex};
@@ -131,6 +131,17 @@ impl<T: Element> Pooled<T> {
     pub(crate) fn into_numbers(mut self) -> Pooled<f64> {
         let vector = try_cast_vec(std::mem::take(&mut self.vector)).unwrap_or_default();
         Pooled { vector, len: self.len * size_of::<T>() / size_of::<f64>(), pool: self.pool.clone() }
+    }
+}
+
+impl Pooled<f64> {
+    /// The numbers as vectors of R components, in the same memory.
+    pub(crate) fn of_vectors<const R: usize>(mut self) -> Pooled<SVector<f64, R>>
+    where
+        SVector<f64, R>: Element,
+    {
+        let vector = try_cast_vec(std::mem::take(&mut self.vector)).unwrap_or_default();
+        Pooled { vector, len: self.len / R, pool: self.pool.clone() }
     }
 }
 

@@ -27,7 +27,7 @@ impl OnDevice for DeviceTangent {
 
 impl<const D: usize> Tangent<'_, D> {
     /// K u on the free degrees of freedom, as the solver computes it: on the device, if the tangent has one. NaN where the device fails.
-    pub(super) fn solver_product(&self, u: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
+    pub fn solver_product(&self, u: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
         let Some(device) = self.device_tangent() else { return self.product(u, out) };
         let gpu = device.gpu();
         let (x, mut y) = (gpu.vector(bytemuck::cast_slice(u)), gpu.zeros(D * u.len()));

@@ -68,17 +68,19 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     fn pass_arrays(&self, connectivity: &Connectivity<D>) -> Vec<Row> {
         let linearized = tangent_bytes(&self.particles, &self.bodies, connectivity, self.has_mean_stress());
         let boxes = connectivity.box_bytes(1);
+        let consistent = self.has_inertia() && self.settings.lumping < 1.0;
         vec![
             (true, "shape functions: N, dN/dx by axis", connectivity.bytes()),
             (true, "linearized tangent", linearized),
             (boxes > 0, "boxes of nodes, one for each block of cells", boxes),
+            // The prediction at the start and at the end of the step.
+            (consistent, "particles: prediction for the consistent inertia", self.particles.len() * 2 * Self::VECTOR),
         ]
     }
 
     fn particle_arrays(&self, connectivity: &Connectivity<D>) -> Vec<Row> {
         let (settings, count, nodes) = (&self.settings, self.particles.len(), connectivity.nodes());
         let variable_count = self.particles.variable_count;
-        let consistent = self.has_inertia() && settings.lumping < 1.0;
         let smooths = self.has_inertia() && settings.smoothing.is_some();
         let fits = self.has_inertia() && settings.projection == Projection::Affine;
         let fit_bytes = count * Self::TENSOR + nodes * (4 * Self::TENSOR + 4 * Self::VECTOR);
@@ -86,8 +88,6 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             (true, "particles: x, H, volume, mass, body, id", count * Particles::<D>::BYTES),
             (self.has_inertia(), "particles: v, a", count * 2 * Self::VECTOR),
             (variable_count > 0, "particles: memory of laws", count * variable_count * NUMBER),
-            // The prediction at the start and at the end of the step.
-            (consistent, "particles: prediction for the consistent inertia", count * 2 * Self::VECTOR),
             // The part of the field that nodes cannot represent, its change, and the change of the other field.
             (smooths, "particles: smoothing", count * 3 * Self::VECTOR),
             (fits, "affine fits of v, a", fit_bytes),

@@ -79,7 +79,7 @@ impl SceneArguments {
         Ok(plan)
     }
 
-    /// Lets Newton's method run on the GPU. Returns the memory that it takes there, in words.
+    /// Lets the simulation run on the GPU. Returns the memory that it takes there, in words.
     ///
     /// # Errors
     /// There is no GPU, the scene does not run there, or it has too little memory.

@@ -170,7 +170,9 @@ impl<const D: usize, L, A> Simulation<D, L, A> {
     /// ```
     pub fn rearrange(&mut self, order: &[u32]) {
         self.workspace.connectivity = None;
-        self.particles.rearrange_in(order, &self.workspace.pool);
+        // Where processes share the passes, the arrays of a pass are shorter, and would hold the memory of an array of all particles.
+        let pool = if self.settings.processes.are_several() { &Pool::default() } else { &self.workspace.pool };
+        self.particles.rearrange_in(order, pool);
         let last = self.history.equilibrium.iter_mut().map(|last| &mut last.loads);
         let loads = std::iter::once(&mut self.loads).chain(last);
         let mut points = loads.flat_map(Loads::points_mut).peekable();

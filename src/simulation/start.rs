@@ -18,7 +18,9 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     pub(super) fn connectivity(&mut self) -> Result<Connectivity<D>, ShapeFunctionError> {
         let resets = self.history.resets_grid();
         match self.workspace.connectivity.take() {
-            Some(connectivity) if !resets && self.workspace.connectivity_is_valid => Ok(connectivity.with_no_pass()),
+            Some(connectivity) if !resets && self.workspace.connectivity_is_valid => {
+                Ok(connectivity.with_no_pass().with_gpu(self.settings.gpu.clone()))
+            }
             spare => {
                 let mut connectivity = self.unaggregated(spare)?;
                 if let Some(order) = connectivity.block_order() {

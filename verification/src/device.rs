@@ -8,7 +8,7 @@ static USED: OnceLock<Arc<Gpu>> = OnceLock::new();
 /// Lets the studies in [`crate::studies::ON_DEVICE`] use the GPU of this machine from now on.
 ///
 /// # Errors
-/// There is none.
+/// There is no GPU that can be used.
 pub fn open() -> Result<(), GpuError> {
     let gpu = Arc::new(Gpu::open()?);
     USED.get_or_init(|| gpu);
@@ -16,6 +16,6 @@ pub fn open() -> Result<(), GpuError> {
 }
 
 /// The GPU, if studies use one.
-pub(crate) fn used() -> Option<Arc<Gpu>> {
+pub fn used() -> Option<Arc<Gpu>> {
     USED.get().cloned()
 }

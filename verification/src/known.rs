@@ -179,14 +179,6 @@ pub const KNOWN: &[Known] = &[
         cells: &[full_effort(&["error of the hole, ring", "cubic"], 2.67e-5)],
     },
     Known {
-        study: "symmetry",
-        what: "a 2D body and a slab of it in 3D, 1,000 random scenes: share of the slabs that cannot be run although the 2D body can; 0 asked",
-        why: "Cubic functions and von Mises flow, averaged over cells, in load steps: the linear solver stagnates on the slab of one cell.",
-        since: "25 November 2026",
-        factor: 1.5,
-        cells: &[full_effort(&["slab in 3D", "image"], 1e-3)],
-    },
-    Known {
         study: "loads",
         what: "a uniform stress under loads on surfaces, with LME functions: its error at 16 cells a unit of length over that at 8; 1 asked",
         why: "Sums over particles of LME functions are no integrals. Errors of a uniform stress, up to 7 %, stay as the grid is refined where the \

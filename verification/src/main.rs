@@ -32,7 +32,8 @@ struct Arguments {
     /// Stop at the first cell that fails; `mutants`, whose cells must fail, continues
     #[arg(long)]
     first: bool,
-    /// Solve linear systems on the GPU of this machine; the studies tangent and newton can
+    /// Multiply by tangents and solve linear systems on the GPU of this machine; the studies tangent and newton can. Functions that have no
+    /// form there stay on the processor
     #[arg(long)]
     gpu: bool,
     /// Write every cell, table and remark as JSON
@@ -156,7 +157,12 @@ fn run(studies: &[(&'static Study, Effort)], arguments: &Arguments) -> Result<bo
         findings.push(done.finding);
         Ok(())
     })?;
-    let passed = findings.iter().all(|finding| finding.passed);
+    let mut passed = findings.iter().all(|finding| finding.passed);
+    if let Some(gpu) = device::used() {
+        let said = gpu.check().map_or_else(|error| format!("FAIL  {error}"), |()| format!("on {}", gpu.name()));
+        passed &= gpu.check().is_ok();
+        writeln!(out, "\n{said}").map_err(writing("to standard output"))?;
+    }
     let summary = format!("\n=== verdict ===\n{}", record::summary(&findings));
     text.extend_from_slice(summary.as_bytes());
     out.write_all(summary.as_bytes()).map_err(writing("to standard output"))?;

@@ -50,7 +50,7 @@ class Scene:
     def build(self, *, laws: Mapping[str, Law] | None = None, gpu: bool = False) -> Simulation:
         """The simulation at its start; `laws` takes the place of the materials of the bodies of these names.
 
-        With `gpu`, Newton's method runs on the GPU of this machine; `SceneError` if there is none.
+        With `gpu`, Newton's method and the transfers run on the GPU of this machine; `SceneError` if there is none.
 
         What bfree chooses by itself it chooses by the scene's material: give one of about the same stiffness.
 

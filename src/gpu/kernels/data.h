@@ -162,12 +162,15 @@ struct Volumes {
     int first_of_b;
 };
 
-// A nodal field at all particles, in the order of the passes: values, or gradients by columns.
+// A nodal field at all particles, in the order of the passes. Each of them has `stride` numbers; the values begin at the number `first`, and the
+// gradient follows by columns.
 struct AtParticles {
     struct Transfer transfer;
     const double *u;
     double *results;
-    int gradients;
+    int stride;
+    int first;
+    int gradient;
 };
 
 // Forces of all particles, in the order of the passes.

@@ -208,8 +208,9 @@ FUNCTION void IN_D(linearized)(const struct Linearize *a, i64 group, int lane, c
 
 // A given force of a particle.
 FUNCTION void IN_D(force_of)(const struct Spread *a, i64 group, int lane, double *out) {
-    const i64 particle = a->pass.transfer.particle_first[group] + lane;
-    for (int c = 0; c < a->components; c++) out[c] = a->forces[particle * a->components + c];
+    const i64 particle = (i64)a->pass.transfer.particle_first[group] + lane;
+    for (int c = 0; c < D; c++)
+        if (c < a->components) out[c] = a->forces[particle * a->components + c];
 }
 
 // Row i of 𝔸_kl + 𝔸_lk for all pairs k < l, and of 𝔸_kk.
@@ -382,11 +383,12 @@ FUNCTION void IN_D(volume)(const struct Volumes *a, i64 group, int lane, const d
     a->volumes[group * LANES + lane] = sum;
 }
 
-// u or L of a particle.
+// u of a particle, and L.
 FUNCTION void IN_D(at_particle)(const struct AtParticles *a, i64 group, int lane, const double *u, const double l[D][D]) {
-    const i64 particle = a->transfer.particle_first[group] + lane;
-    for (int k = 0; k < D * D && a->gradients; k++) a->results[particle * D * D + k] = l[k % D][k / D];
-    for (int c = 0; c < D && !a->gradients; c++) a->results[particle * D + c] = u[c];
+    double *results = a->results + ((i64)a->transfer.particle_first[group] + lane) * a->stride + a->first;
+    for (int c = 0; c < D; c++) results[c] = u[c];
+    if (a->gradient)
+        for (int k = 0; k < D * D; k++) results[D + k] = l[k % D][k / D];
 }
 
 GATHER_KERNEL(volumes, Volumes, IN_D(volume))
@@ -431,7 +433,7 @@ GATHER_KERNEL(linearize, Linearize, IN_D(linearized))
 #define PASS_NUMBERS D
 #define PASS_GATHERS 0
 #define PASS_POINT(group, lane, u, l, out) IN_D(force_of)(&a, group, lane, out)
-#define PASS_SCATTER(...) IN_D(scatter)(&a.pass, a.pass.magnitudes, __VA_ARGS__)
+#define PASS_SCATTER(...) IN_D(scatter)(&a.pass, 0, __VA_ARGS__)
 #include "pass.h"
 
 #undef NUMBERS

@@ -51,7 +51,7 @@ pub(crate) fn reached_conditions<const D: usize>(
         };
         corners(grid.index(cell)).flat_map(of_node).collect()
     };
-    // A particle in the cell of the last grid reset has reached nothing.
+    // A particle that is still in its cell has reached nothing.
     let moved = |p: usize| (grid.cell(&present[p]) != grid.cell(&at_reset[p])).then(|| field(p));
     let keys = cells(present, &moved, grid);
     let of_part = |part: &[(u64, u32)]| -> Vec<_> {

@@ -348,7 +348,7 @@ impl<const D: usize> Connectivity<D> {
     /// Each process has written `count` numbers for each of its [own particles](Self::own_particles). Fills in the numbers of the others.
     pub(crate) fn share_particles(&self, count: usize, numbers: &mut [f64]) {
         if let Some(tiled) = self.tiled().filter(|tiled| tiled.is_memory_order) {
-            tiled.share_numbers(Each::Particle, count, numbers);
+            tiled.share_numbers(Each::Particle(count), numbers);
         }
     }
 

@@ -66,11 +66,10 @@ type Point<'a, const C: usize, const D: usize> = dyn Fn(Group<'_>, &[At<f64, C, 
 /// `(group, u and L of every field, results)`: writes the results of the group.
 type Evaluate<'a, R, const C: usize, const D: usize> = dyn Fn(Group<'_>, &[At<f64, C, D>], &mut [R]) + Sync + 'a;
 
-/// Whether a pass has one result for each particle, or several for each group.
+/// The results of a pass: so many for each particle, or for each group.
 #[derive(Clone, Copy)]
 enum Each {
-    Particle,
-    /// So many results for each group.
+    Particle(usize),
     Group(usize),
 }
 
@@ -78,7 +77,7 @@ impl Each {
     /// The number of results of a group with so many particles.
     fn of_group(self, particles: usize) -> usize {
         match self {
-            Self::Particle => particles,
+            Self::Particle(count) => particles * count,
             Self::Group(count) => count,
         }
     }
@@ -86,7 +85,7 @@ impl Each {
     /// The number of results of a block.
     fn of_block(self, block: &Block) -> usize {
         match self {
-            Self::Particle => block.count(),
+            Self::Particle(count) => block.count() * count,
             Self::Group(count) => block.len() * count,
         }
     }

@@ -2,18 +2,22 @@
 
 use super::group::{At, Group};
 use super::tiled::Tiled;
-use super::{Connectivity, Each, Mode, Weights};
-use crate::gpu::{Buffer, Gpu, Masses, States, Transfer, TransferArrays};
+use super::{Connectivity, Each};
+use crate::gpu::{Buffer, Copies, Gpu, Masses, States, Transfer, TransferArrays};
 use crate::lanes::LANES;
 use crate::parallel;
-use crate::pooled::{Element, Pooled};
+use crate::pooled::Pooled;
 use crate::tensor::Vector;
 use bytemuck::Pod;
 use std::sync::Arc;
 
 impl<const D: usize> Connectivity<D> {
-    /// This connectivity with a device, on which Newton's method runs.
+    /// This connectivity with a device, on which Newton's method and the transfers run.
     pub(crate) fn with_gpu(mut self, gpu: Option<Arc<Gpu>>) -> Self {
+        let is_same = self.gpu.as_ref().zip(gpu.as_ref()).is_some_and(|(before, gpu)| Arc::ptr_eq(before, gpu));
+        if !is_same {
+            self.copies = Copies::default();
+        }
         self.gpu = gpu;
         self
     }
@@ -28,40 +32,38 @@ impl<const D: usize> Connectivity<D> {
         Some(self.copies.transfer.get_or_init(copied))
     }
 
-    /// Writes Σ u_I N_I at all particles, or Σ u_I ⊗ ∇N_I, in the order of the passes. Returns whether a device has done so.
-    pub(super) fn gather_on_device<X: Element, const C: usize>(
+    /// Writes the values of nodal fields at all particles, in the order of the passes; behind those of the first field its gradient by columns, if
+    /// `gradient`. Returns whether a device has done so.
+    pub(super) fn gather_on_device<const C: usize>(
         &self,
-        mode: Mode,
-        field: &[Vector<f64, C>],
-        results: &mut [X],
+        fields: &[&[Vector<f64, C>]],
+        gradient: bool,
+        results: &mut [f64],
     ) -> bool {
         let Some(transfer) = self.on_device().filter(|_| C == D) else { return false };
-        transfer.gather(mode.gradient, bytemuck::cast_slice(field), bytemuck::cast_slice_mut(results))
+        let fields: Vec<&[f64]> = fields.iter().map(|field| bytemuck::cast_slice(field)).collect();
+        transfer.gather(&fields, gradient, results)
     }
 
-    /// `out += Σ_p value(p) N_I` with the given weights in place of N. Returns whether a device has done so.
+    /// `out += Σ_p value(p) N_I`. Returns whether a device has done so.
     pub(super) fn spread_on_device<const C: usize>(
         &self,
-        weights: Weights,
         out: &mut [Vector<f64, C>],
         value: &(dyn Fn(usize) -> Vector<f64, C> + Sync),
     ) -> bool {
-        let Some((transfer, tiled)) = self.on_device().zip(self.tiled()).filter(|_| weights != Weights::Square) else {
-            return false;
-        };
+        let Some((transfer, tiled)) = self.on_device().zip(self.tiled()) else { return false };
         let mut forces: Pooled<Vector<f64, C>> = self.pool().unspecified(self.particles());
         let evaluate = |group: Group<'_>, _: &[At<f64, D, D>], forces: &mut [Vector<f64, C>]| {
             group.particles.iter().zip(forces).for_each(|(&p, force)| *force = value(p as usize));
         };
-        tiled.results(Each::Particle, 0, None, Mode::BOTH, &evaluate, &mut forces);
+        tiled.results(Each::Particle(1), &[], None, &evaluate, &mut forces);
         let mut sums: Pooled<Vector<f64, D>> =
             self.pool().made(out.len(), |node| Vector::from_fn(|c, _| out[node].get(c).copied().unwrap_or(0.0)));
-        let magnitudes = weights == Weights::Magnitude;
-        let spread = transfer.spread(C, magnitudes, bytemuck::cast_slice(&forces), bytemuck::cast_slice_mut(&mut sums));
-        if spread {
+        let is_done = transfer.spread(C, bytemuck::cast_slice(&forces), bytemuck::cast_slice_mut(&mut sums));
+        if is_done {
             parallel::zip(out, &sums, |out, sum| (0..C).for_each(|c| out[c] = sum[c]));
         }
-        spread
+        is_done
     }
 
     /// The masses of particles and nodes on the device.
@@ -105,7 +107,7 @@ impl<const D: usize> Connectivity<D> {
             }
         };
         if let Some(tiled) = self.tiled() {
-            tiled.results(Each::Group(count), 0, None, Mode::BOTH, &evaluate, &mut rows);
+            tiled.results(Each::Group(count), &[], None, &evaluate, &mut rows);
         }
         rows
     }

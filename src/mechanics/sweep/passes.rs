@@ -5,9 +5,10 @@ use super::group::At;
 use super::tiled::Tiled;
 use super::{Connectivity, Each, Group, Mode, Number, Quadratic, Weights};
 use crate::lanes::LANES;
-use crate::parallel::{First, Message};
+use crate::parallel::{self, First, Message};
 use crate::pooled::{Element, Pooled};
 use crate::tensor::{Tensor, Vector};
+use std::borrow::Cow;
 
 impl<const D: usize> Connectivity<D> {
     /// `f_I += Σ_p q N_I + σ ∇_r N_I` for C components: 1 or D. `point(group, u and L, q and σ)` adds to q and σ, which begin with
@@ -39,7 +40,7 @@ impl<const D: usize> Connectivity<D> {
         fill: impl Fn(Group<'_>, &At<f64, D, D>, &mut [[f64; LANES]]) + Sync,
     ) {
         let fill = |group: Group<'_>, at: &[At<f64, D, D>], rows: &mut [[f64; LANES]]| fill(group, &at[0], rows);
-        self.results(Each::Group(count), 1, Some(bytemuck::cast_slice(field)), Mode::GRADIENT, rows, fill);
+        self.results(Each::Group(count), &[Mode::GRADIENT], Some(bytemuck::cast_slice(field)), rows, fill);
     }
 
     /// [`Self::fill_rows`] for the groups of all processes.
@@ -53,7 +54,7 @@ impl<const D: usize> Connectivity<D> {
         let own = self.own_groups();
         self.fill_rows(field, count, &mut rows[own.start * count..own.end * count], fill);
         if let Some(tiled) = self.tiled() {
-            tiled.share_numbers(Each::Group(count), LANES, rows.as_flattened_mut());
+            tiled.share_numbers(Each::Group(count * LANES), rows.as_flattened_mut());
         }
     }
 
@@ -62,7 +63,7 @@ impl<const D: usize> Connectivity<D> {
         let mut results = vec![R::blank(); self.groups()];
         let evaluate = |group: Group<'_>, _: &[At<f64, D, D>], results: &mut [R]| results[0] = evaluate(group);
         let own = &mut results[self.own_groups()];
-        dispatch!(self, one => one.results(Each::Group(1), 0, None, Mode::BOTH, &evaluate, own));
+        dispatch!(self, one => one.results(Each::Group(1), &[], None, &evaluate, own));
         if let Some(tiled) = self.tiled() {
             tiled.share_results(Each::Group(1), &mut results);
         }
@@ -154,7 +155,7 @@ impl<const D: usize> Connectivity<D> {
         out: &mut [Vector<f64, C>],
         value: impl Fn(usize) -> Vector<f64, C> + Sync,
     ) {
-        if self.spread_on_device(weights, out, &value) {
+        if weights == Weights::Signed && self.spread_on_device(out, &value) {
             return self.pass();
         }
         self.sweep(None, Mode { weights, ..Mode::VALUE }, out, |group, _, sums| {
@@ -173,47 +174,52 @@ impl<const D: usize> Connectivity<D> {
         Vector<f64, C>: Element,
     {
         const { assert!(C == 1 || C == D) };
-        self.gathered(false, field, Mode::VALUE, |at, lane| Vector::from_fn(|c, _| at.value[c][lane]))
+        self.gathered(false, &[field], false).of_vectors()
     }
 
     /// [`Self::values`] at the [own particles](Self::own_particles) of this process.
     pub(crate) fn own_values(&self, field: &[Vector<f64, D>]) -> Pooled<Vector<f64, D>> {
-        self.gathered(true, field, Mode::VALUE, |at, lane| Vector::from_fn(|c, _| at.value[c][lane]))
+        self.gathered(true, &[field], false).of_vectors()
     }
 
-    /// Σ u_I ⊗ ∇_r N_I at the [own particles](Self::own_particles) of this process.
-    pub(crate) fn own_gradients(&self, field: &[Vector<f64, D>]) -> Pooled<Tensor<f64, D>> {
-        self.gathered(true, field, Mode::GRADIENT, |at, lane| Tensor::from_fn(|c, k| at.gradient[c][k][lane]))
+    /// Of each of the [own particles](Self::own_particles) of this process the numbers of Σ u_I N_I, of Σ u_I ⊗ ∇_r N_I by columns, and the
+    /// values of `more` fields.
+    pub(crate) fn own_motions(&self, u: &[Vector<f64, D>], more: &[&[Vector<f64, D>]]) -> Pooled<f64> {
+        self.gathered(true, &[&[u], more].concat(), true)
     }
 
-    /// `point(u and L, lane)` of all particles, or of the [own particles](Self::own_particles) of this process.
-    fn gathered<X: Element, const C: usize>(
-        &self,
-        own_alone: bool,
-        field: &[Vector<f64, C>],
-        mode: Mode,
-        point: impl Fn(&At<f64, C, D>, usize) -> X + Sync,
-    ) -> Pooled<X> {
-        let own = self.own_places();
-        let fill = |results: &mut [X]| {
-            if self.gather_on_device(mode, field, results) {
+    /// The values of nodal fields at all particles, or at the [own particles](Self::own_particles) of this process; behind those of the first
+    /// field its gradient by columns, if `gradient`.
+    fn gathered<const C: usize>(&self, own_alone: bool, fields: &[&[Vector<f64, C>]], gradient: bool) -> Pooled<f64> {
+        let count = C * fields.len() + if gradient { C * D } else { 0 };
+        let fill = |results: &mut [f64]| {
+            if self.gather_on_device(fields, gradient, results) {
                 return self.pass();
             }
-            let point = |_: usize, at: &[At<f64, C, D>], lane: usize| point(&at[0], lane);
-            self.at_own_particles(1, bytemuck::cast_slice(field), mode, results, point);
+            let mut modes = vec![Mode::VALUE; fields.len()];
+            modes[0].gradient = gradient;
+            let evaluate = |group: Group<'_>, at: &[At<f64, C, D>], results: &mut [f64]| {
+                for (lane, results) in results.chunks_mut(count).take(group.particles.len()).enumerate() {
+                    let values = |at: &At<f64, C, D>| at.value.map(|row| row[lane]);
+                    let (first, more) = results.split_at_mut(count - C * (fields.len() - 1));
+                    first[..C].copy_from_slice(&values(&at[0]));
+                    first[C..].iter_mut().enumerate().for_each(|(k, x)| *x = at[0].gradient[k % C][k / C][lane]);
+                    more.chunks_mut(C).zip(&at[1..]).for_each(|(more, at)| more.copy_from_slice(&values(at)));
+                }
+            };
+            self.results(Each::Particle(count), &modes, Some(&side_by_side(fields)), results, evaluate);
         };
+        let own = self.own_places();
         // If particles do not lie in the order of the passes, every process needs all of them.
         if own_alone && self.is_memory_order() {
-            let mut results = self.pool().unspecified(own.len());
+            let mut results = self.pool().unspecified(own.len() * count);
             fill(&mut results);
             return results;
         }
-        let mut results = self.pool().unspecified(self.particles());
-        fill(&mut results[own]);
-        let count = size_of::<X>() / size_of::<f64>();
-        self.in_memory_order(&mut results, |tiled, results| {
-            tiled.share_numbers(Each::Particle, count, bytemuck::cast_slice_mut(results));
-        });
+        let mut results = self.pool().unspecified(self.particles() * count);
+        fill(&mut results[own.start * count..own.end * count]);
+        let each = Each::Particle(count);
+        self.in_memory_order(count, &mut results, |tiled, results| tiled.share_numbers(each, results));
         results
     }
 
@@ -241,48 +247,36 @@ impl<const D: usize> Connectivity<D> {
             let gradient = Tensor::from_fn(|c, k| T::from_fields(|i| fields[i].gradient[c][k][lane]));
             point(p, value, gradient)
         };
-        let mut results = vec![R::blank(); self.particles()];
-        self.at_own_particles(T::FIELDS, &T::flat(field), Mode::BOTH, &mut results[self.own_places()], point);
-        self.in_memory_order(&mut results, |tiled, results| tiled.share_results(Each::Particle, results));
-        results
-    }
-
-    /// Writes `point(p, u and L of every field, lane)` of this process's particles, in the order of the passes.
-    fn at_own_particles<R: Copy + Send, const C: usize>(
-        &self,
-        fields: usize,
-        field: &[f64],
-        mode: Mode,
-        results: &mut [R],
-        point: impl Fn(usize, &[At<f64, C, D>], usize) -> R + Sync,
-    ) {
-        let evaluate = |group: Group<'_>, at: &[At<f64, C, D>], results: &mut [R]| {
+        let evaluate = |group: Group<'_>, at: &[At<f64, D, D>], results: &mut [R]| {
             for (lane, (&p, result)) in group.particles.iter().zip(results).enumerate() {
                 *result = point(p as usize, at, lane);
             }
         };
-        self.results(Each::Particle, fields, Some(field), mode, results, evaluate);
+        let (each, modes) = (Each::Particle(1), vec![Mode::BOTH; T::FIELDS]);
+        let mut results = vec![R::blank(); self.particles()];
+        self.results(each, &modes, Some(&T::flat(field)), &mut results[self.own_places()], evaluate);
+        self.in_memory_order(1, &mut results, |tiled, results| tiled.share_results(each, results));
+        results
     }
 
-    /// Calls `evaluate(group, u and L of every field, results)` for every group of this process.
+    /// Calls `evaluate(group, u and L of every field, results)` for every group of this process. There is a mode for each field.
     fn results<R: Send, const C: usize>(
         &self,
         each: Each,
-        fields: usize,
+        modes: &[Mode],
         field: Option<&[f64]>,
-        mode: Mode,
         results: &mut [R],
         evaluate: impl Fn(Group<'_>, &[At<f64, C, D>], &mut [R]) + Sync,
     ) {
         self.pass();
-        dispatch!(self, one => one.results(each, fields, field, mode, &evaluate, results));
+        dispatch!(self, one => one.results(each, modes, field, &evaluate, results));
     }
 
-    /// Takes the results of other processes by `share`, and moves all results to the order of the particles in memory.
-    fn in_memory_order<R: Copy>(&self, results: &mut [R], share: impl FnOnce(&Tiled<D>, &mut [R])) {
+    /// Takes the results of other processes by `share`, and moves all results, so many for each particle, to the order of the particles in memory.
+    fn in_memory_order<R: Copy>(&self, count: usize, results: &mut [R], share: impl FnOnce(&Tiled<D>, &mut [R])) {
         if let Some(tiled) = self.tiled() {
             share(tiled, results);
-            tiled.to_memory_order(results);
+            tiled.to_memory_order(count, results);
         }
     }
 
@@ -307,4 +301,16 @@ impl<const D: usize> Connectivity<D> {
         failure.check(self.processes())?;
         Ok(results)
     }
+}
+
+/// Nodal fields as plain numbers: node after node, field after field.
+fn side_by_side<'a, const C: usize>(fields: &[&'a [Vector<f64, C>]]) -> Cow<'a, [f64]> {
+    if let &[field] = fields {
+        return Cow::Borrowed(bytemuck::cast_slice(field));
+    }
+    let mut numbers = vec![0.0; fields.iter().map(|field| field.len() * C).sum()];
+    parallel::rows(&mut numbers, fields.len() * C, |node, numbers| {
+        numbers.chunks_mut(C).zip(fields).for_each(|(numbers, field)| numbers.copy_from_slice(field[node].as_slice()));
+    });
+    Cow::Owned(numbers)
 }

@@ -147,9 +147,8 @@ impl<const D: usize> Plain<D> {
     pub(super) fn results<R: Send, const C: usize>(
         &self,
         each: Each,
-        fields: usize,
+        modes: &[Mode],
         field: Option<&[f64]>,
-        _: Mode,
         evaluate: &Evaluate<'_, R, C, D>,
         results: &mut [R],
     ) {
@@ -158,7 +157,7 @@ impl<const D: usize> Plain<D> {
         parallel::for_each(tasks, &|(task, results): (usize, &mut [R])| {
             for (number, results) in results.chunks_mut(count).enumerate() {
                 let group = self.group(task * TASK + number);
-                evaluate(group, &self.gathered(group, fields, field), results);
+                evaluate(group, &self.gathered(group, modes.len(), field), results);
             }
         });
     }

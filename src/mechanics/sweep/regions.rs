@@ -44,7 +44,7 @@ impl<const D: usize> Tiled<D> {
         out: &mut [f64],
         point: &Point<'_, C, D>,
     ) {
-        let numbers = fields * C;
+        let (numbers, modes) = (fields * C, vec![mode; fields]);
         // The buffer of a field is one vector longer than its nodes, since scatters write whole vectors.
         let length = |block: &Block| block.box_nodes() * C + LANES;
         let work = |block: &Block, scratch: &mut Scratch<C, D>, buffer: &mut [f64]| {
@@ -57,7 +57,7 @@ impl<const D: usize> Tiled<D> {
             for group in 0..block.len() {
                 let mut window = block.window::<D>(group);
                 if field.is_some() {
-                    gather(window, nodal, mode, at);
+                    gather(window, nodal, &modes, at);
                 }
                 sums.fill(At::zero());
                 point(block.group(group), at, sums);
@@ -176,22 +176,21 @@ impl<const D: usize> Tiled<D> {
     pub(super) fn results<R: Send, const C: usize>(
         &self,
         each: Each,
-        fields: usize,
+        modes: &[Mode],
         field: Option<&[f64]>,
-        mode: Mode,
         evaluate: &Evaluate<'_, R, C, D>,
         mut results: &mut [R],
     ) {
         let work = |scratch: &mut Scratch<C, D>, (block, mut results): (&Block, &mut [R])| {
             let Scratch { nodal, at, .. } = scratch;
-            at.resize(fields, At::zero());
+            at.resize(modes.len(), At::zero());
             if let Some(field) = field {
-                gather_boxes::<C>(block, field, fields, nodal);
+                gather_boxes::<C>(block, field, modes.len(), nodal);
             }
             for number in 0..block.len() {
                 let group = block.group(number);
                 if field.is_some() {
-                    gather(block.window::<D>(number), nodal, mode, at);
+                    gather(block.window::<D>(number), nodal, modes, at);
                 }
                 let own = results.split_off_mut(..each.of_group(group.particles.len()));
                 own.into_iter().for_each(|own| evaluate(group, at, own));
@@ -214,10 +213,10 @@ impl<const D: usize> Tiled<D> {
         }
     }
 
-    /// [`Self::share_results`] for results of `count` plain numbers, in place.
-    pub(super) fn share_numbers(&self, each: Each, count: usize, numbers: &mut [f64]) {
+    /// [`Self::share_results`] for plain numbers, in place.
+    pub(super) fn share_numbers(&self, each: Each, numbers: &mut [f64]) {
         if let Some((_, shares)) = self.shared() {
-            shares.share_numbers(&self.blocks, |block| each.of_block(block) * count, numbers);
+            shares.share_numbers(&self.blocks, |block| each.of_block(block), numbers);
         }
     }
 }
@@ -255,8 +254,9 @@ fn gather_boxes<const C: usize>(block: &Block, field: &[f64], fields: usize, nod
 }
 
 /// Gathers u and L of a group from the boxes of the fields.
-fn gather<const C: usize, const D: usize>(window: Window<'_>, nodal: &[f64], mode: Mode, at: &mut [At<f64, C, D>]) {
-    for (nodal, At { value, gradient }) in nodal.chunks(nodal.len() / at.len()).zip(at) {
+fn gather<const C: usize, const D: usize>(window: Window<'_>, nodal: &[f64], modes: &[Mode], at: &mut [At<f64, C, D>]) {
+    let boxes = nodal.chunks(nodal.len() / at.len());
+    for ((nodal, &mode), At { value, gradient }) in boxes.zip(modes).zip(at) {
         kernel::gather(C, Gather { window, nodal, mode, value, gradient: gradient.as_flattened_mut() });
     }
 }

@@ -147,11 +147,13 @@ impl<const D: usize> Tiled<D> {
         self.keys.iter().map(|key| key.particle)
     }
 
-    /// Moves results from [`Self::order`] to the order of the particles in memory.
-    pub(super) fn to_memory_order<R: Copy>(&self, results: &mut [R]) {
+    /// Moves results, so many for each particle, from [`Self::order`] to the order of the particles in memory.
+    pub(super) fn to_memory_order<R: Copy>(&self, count: usize, results: &mut [R]) {
         if !self.is_memory_order {
             let unsorted = results.to_vec();
-            self.order().zip(unsorted).for_each(|(p, result)| results[p as usize] = result);
+            for (p, own) in self.order().zip(unsorted.chunks(count)) {
+                results[p as usize * count..][..count].copy_from_slice(own);
+            }
         }
     }
 

@@ -20,8 +20,9 @@ pub(crate) struct Inertia<'a, const D: usize> {
     mass: Mass<'a, D>,
     nodal: &'a Nodal<D>,
     alphas: Alphas,
-    /// φ̂ at the particles; empty for a lumped mass.
+    /// φ̂ at this process's particles, from the one at the place `first` in memory; empty for a lumped mass.
     predicted: Pooled<Vector<f64, D>>,
+    first: usize,
     predicted_on_device: OnceLock<Buffer<f64>>,
 }
 
@@ -34,9 +35,10 @@ impl<'a, const D: usize> Inertia<'a, D> {
         let mut predicted = Pooled::default();
         if mass.lumping < 1.0 {
             let of_nodes = mass.connectivity.pool().made(mass.lumped.len(), |node| nodal.predicted(&alphas, node));
-            predicted = mass.connectivity.values(&of_nodes);
+            predicted = mass.connectivity.own_values(&of_nodes);
         }
-        Some(Self { mass, nodal, alphas, predicted, predicted_on_device: OnceLock::new() })
+        let first = mass.connectivity.own_particles().start;
+        Some(Self { mass, nodal, alphas, predicted, first, predicted_on_device: OnceLock::new() })
     }
 
     /// The consistent part on a device; `None` if the mass is lumped.
@@ -74,13 +76,13 @@ impl<const D: usize> Term<D> for Inertia<'_, D> {
 
     /// q = (1−ε) m a
     fn at_points<T: Number>(&self, _: Part, _: Trial<'_, T, D>) -> Option<(Mode, AtPoints<'_, T, D>)> {
-        let predicted: &[Vector<f64, D>] = &self.predicted;
+        let (predicted, first): (&[Vector<f64, D>], _) = (&self.predicted, self.first);
         let add: AtPoints<'_, T, D> = Box::new(move |group, at, sums| {
             for (lane, &p) in group.particles.iter().enumerate() {
                 let weight = T::lit(self.alphas.a1 * self.mass.consistent(p as usize));
                 mutant!("inertia: the residual lacks the consistent part": weight = T::zero());
                 for c in 0..D {
-                    sums.value[c][lane] += weight * (at.value[c][lane] - T::lit(predicted[p as usize][c]));
+                    sums.value[c][lane] += weight * (at.value[c][lane] - T::lit(predicted[p as usize - first][c]));
                 }
             }
             Ok(())
@@ -99,7 +101,7 @@ impl<const D: usize> Term<D> for Inertia<'_, D> {
         if self.mass.lumping < 1.0 {
             let half_a1 = T::lit(0.5 * self.alphas.a1);
             let energy = |p: usize, u: Vector<T, D>, _: Tensor<T, D>| {
-                let u = u - self.predicted[p].map(T::lit);
+                let u = u - self.predicted[p - self.first].map(T::lit);
                 half_a1 * T::lit(self.mass.consistent(p)) * u.dot(&u)
             };
             let of_particles = summed(self.mass.connectivity.evaluate(phi, energy));

@@ -81,9 +81,38 @@ pub struct Update<'a, const D: usize> {
     smoothed: Option<[Pooled<Vector<f64, D>>; 2]>,
     /// The internal variables at the end of the step, by particle.
     memory: Option<Vec<f64>>,
-    /// Δx and ∇_r φ of this process's particles, evaluated once.
-    moved: OnceCell<Pooled<Vector<f64, D>>>,
-    gradients: OnceCell<Pooled<Tensor<f64, D>>>,
+    /// The numbers of [`Changes`], gathered once.
+    changes: OnceCell<Pooled<f64>>,
+}
+
+/// The changes of this process's particles since the last grid reset, Δx and ∇_r φ by columns, and those of the step with inertia, Δv and Δa.
+/// Particles are numbered from the first of this process.
+struct Changes<'a, const D: usize> {
+    numbers: &'a [f64],
+    /// Numbers of a particle.
+    count: usize,
+}
+
+impl<const D: usize> Changes<'_, D> {
+    fn of(&self, own: usize) -> &[f64] {
+        &self.numbers[own * self.count..(own + 1) * self.count]
+    }
+
+    /// Δx
+    fn moved(&self, own: usize) -> Vector<f64, D> {
+        Vector::from_column_slice(&self.of(own)[..D])
+    }
+
+    /// ∇_r φ
+    fn gradient(&self, own: usize) -> Tensor<f64, D> {
+        Tensor::from_column_slice(&self.of(own)[D..D + D * D])
+    }
+
+    /// Δv for `order` 0, and Δa for 1.
+    fn increment(&self, own: usize, order: usize) -> Vector<f64, D> {
+        let first = D + D * D + order * D;
+        Vector::from_column_slice(&self.of(own)[first..first + D])
+    }
 }
 
 impl<'a, const D: usize> Update<'a, D> {
@@ -227,14 +256,12 @@ impl<'a, const D: usize> Update<'a, D> {
         pool.made(dphi.len(), |node| dphi[node] / dt)
     }
 
-    /// Δx since the last grid reset, of this process's particles.
-    fn moved(&self, connectivity: &Connectivity<D>) -> &[Vector<f64, D>] {
-        self.moved.get_or_init(|| connectivity.own_values(self.motion()))
-    }
-
-    /// ∇_r φ of this process's particles.
-    fn gradients(&self, connectivity: &Connectivity<D>) -> &[Tensor<f64, D>] {
-        self.gradients.get_or_init(|| connectivity.own_gradients(self.motion()))
+    /// The changes of this process's particles.
+    fn changes(&self, connectivity: &Connectivity<D>) -> Changes<'_, D> {
+        let fields: [&[Vector<f64, D>]; 2] = [&self.delta_velocity, &self.delta_acceleration];
+        let more = if self.delta_velocity.is_empty() { &[] } else { &fields[..] };
+        let numbers = self.changes.get_or_init(|| connectivity.own_motions(self.motion(), more));
+        Changes { numbers, count: D + D * D + more.len() * D }
     }
 
     /// The particle with the smallest id of those that would leave the grid: its id, and its position outside.
@@ -244,10 +271,10 @@ impl<'a, const D: usize> Update<'a, D> {
         connectivity: &Connectivity<D>,
         grid: &Grid<D>,
     ) -> Option<(usize, Vector<f64, D>)> {
-        let (own, moved) = (connectivity.own_particles(), self.moved(connectivity));
+        let (own, changes) = (connectivity.own_particles(), self.changes(connectivity));
         let (position, id) = (&particles.reference().position[own.clone()], &particles.id[own]);
-        let first = parallel::collect(parallel::parts(moved.len()), &|own: Range<usize>| {
-            let ends = own.map(|p| (id[p] as usize, position[p] + moved[p]));
+        let first = parallel::collect(parallel::parts(id.len()), &|own: Range<usize>| {
+            let ends = own.map(|p| (id[p] as usize, position[p] + changes.moved(p)));
             ends.filter(|(_, x)| !grid.contains(x)).min_by_key(|(id, _)| *id)
         });
         let first = first.into_iter().flatten().min_by_key(|(id, _)| *id);
@@ -267,11 +294,11 @@ impl<'a, const D: usize> Update<'a, D> {
         let variable_count = particles.variable_count;
         let (mut next, undefined) = (parallel::copy_of(&particles.memory), First::none());
         if variable_count > 0 || !particles.dilatation.is_empty() {
-            let (own, gradients) = (connectivity.own_particles(), self.gradients(connectivity));
+            let (own, changes) = (connectivity.own_particles(), self.changes(connectivity));
             let update = |p: usize, next: &mut [f64]| {
                 let law = &bodies[particles.body[p] as usize].law;
                 let memory = &particles.memory[p * variable_count..(p + 1) * variable_count];
-                let h = Kinematics(particles).displacement_gradient(p, &gradients[p - own.start]);
+                let h = Kinematics(particles).displacement_gradient(p, &changes.gradient(p - own.start));
                 let (at, det_f) = MaterialState::new(h).admissible_or_rest();
                 law.update_variables(&at.in_step(dt, memory), next);
                 let energy = if law.has_potential() { law.energy(&at.in_step(0.0, next)) } else { 0.0 };
@@ -314,24 +341,24 @@ impl<'a, const D: usize> Update<'a, D> {
         particles.memory = next;
         let strain = self.move_particles(particles, connectivity);
         // Without inertia there are no increments.
-        let increments =
-            [(&mut particles.velocity, self.delta_velocity), (&mut particles.acceleration, self.delta_acceleration)];
-        let with_changes = increments.into_iter().zip(self.smoothed.unwrap_or_default());
-        for ((field, delta), changed) in with_changes.filter(|((_, delta), _)| !delta.is_empty()) {
-            let (own, mut delta) = (connectivity.own_particles(), connectivity.own_values(&delta));
-            if !changed.is_empty() {
-                parallel::zip(&mut delta, &changed[own.clone()], |delta, changed| *delta += changed);
+        if !self.delta_velocity.is_empty() {
+            let (own, changes) = (connectivity.own_particles(), self.changes(connectivity));
+            let fields = [&mut particles.velocity, &mut particles.acceleration];
+            for (order, field) in fields.into_iter().enumerate() {
+                let smoothed = self.smoothed.as_ref().map(|smoothed| &smoothed[order][own.clone()]);
+                parallel::each(&mut field[own.clone()], |p, field| {
+                    let delta = changes.increment(p, order);
+                    *field += smoothed.map_or(delta, |smoothed| delta + smoothed[p]);
+                });
+                connectivity.share_particles(D, bytemuck::cast_slice_mut(field));
             }
-            parallel::zip(&mut field[own], &delta, |field, delta| *field += delta);
-            connectivity.share_particles(D, bytemuck::cast_slice_mut(field));
         }
         Committed { strain, yielding }
     }
 
     /// Writes x = x_r + Δx and F = (I + ∇_r φ) F_r. Returns the largest strain since the last grid reset.
     fn move_particles(&self, particles: &mut Particles<D>, connectivity: &Connectivity<D>) -> f64 {
-        let (own, moved, gradients) =
-            (connectivity.own_particles(), self.moved(connectivity), self.gradients(connectivity));
+        let (own, changes) = (connectivity.own_particles(), self.changes(connectivity));
         let Particles { position, displacement_gradient, reference, .. } = particles;
         let (first, reference) = (own.start, reference.as_ref());
         let (x, h) = (&mut position[own.clone()], &mut displacement_gradient[own]);
@@ -344,10 +371,11 @@ impl<'a, const D: usize> Update<'a, D> {
                 h.copy_from_slice(&reference.displacement_gradient[of_all]);
             }
             let mut largest = 0.0_f64;
-            for ((x, h), (delta_x, g)) in x.iter_mut().zip(h).zip(moved[own.clone()].iter().zip(&gradients[own])) {
+            for ((x, h), p) in x.iter_mut().zip(h).zip(own) {
+                let g = changes.gradient(p);
                 largest = largest.max((g + g.transpose() + g.transpose() * g).norm() * 0.5);
-                *x += delta_x;
-                *h = compose(g, h);
+                *x += changes.moved(p);
+                *h = compose(&g, h);
             }
             largest
         });

@@ -8,8 +8,6 @@ use bfree::material::Law;
 use bfree::mechanics::residual::{Equilibrium, Inadmissible, compose};
 use bfree::mechanics::tangent::Tangent;
 use bfree::simulation::Simulation;
-use bfree::solver::Linearization;
-use bfree::space::vector::Vectors;
 use bfree::tensor::{Tensor, Vector, identity};
 use num_dual::Dual64;
 use std::collections::HashSet;
@@ -183,17 +181,9 @@ fn measure_pieces<const D: usize, L: Law>(
 
 type Field<const D: usize> = Vec<Vector<f64, D>>;
 
-/// K u, where the solver computes it. NaN if the device fails.
 fn product<const D: usize>(tangent: &Tangent<'_, D>, u: &[Vector<f64, D>]) -> Field<D> {
     let mut out = vec![Vector::zeros(); u.len()];
-    let Some(system) = tangent.on_device() else {
-        tangent.product(u, &mut out);
-        return out;
-    };
-    let gpu = system.gpu();
-    let (x, mut y) = (gpu.vector(bytemuck::cast_slice(u)), gpu.zeros(D * u.len()));
-    system.apply(&x, &mut y);
-    bytemuck::cast_slice_mut(&mut out).copy_from_slice(&gpu.numbers(&y));
+    tangent.solver_product(u, &mut out);
     out
 }
 

@@ -9,8 +9,10 @@ use bfree::mechanics::residual::Equilibrium;
 use bfree::pooled::Pool;
 use bfree::simulation::{AdvanceError, Simulation};
 use bfree::solver::{
-    BlockJacobi, Forcing, GmresSettings, Krylov, NewtonHistory, NewtonSettings, NonlinearProblem, System, newton,
+    BlockJacobi, Forcing, GmresSettings, Krylov, NewtonHistory, NewtonSettings, NonlinearProblem, Preconditioner,
+    System, newton,
 };
+use bfree::space::vector::Vectors;
 use bfree::tensor::Vector;
 
 pub(super) const ABOUT: &str =
@@ -277,8 +279,17 @@ fn step(problem: &Equilibrium<'_, 2, Material>, mut x: Vec<f64>) -> Result<(f64,
         let settings = GmresSettings { relative_tolerance: 1e-13, restart: 200, max_iterations: 400 };
         let mut blocks = BlockJacobi::<2>::default();
         blocks.take(&*tangent);
-        let system = System { vectors: &Pool::default(), operator: &*tangent, inverse: &blocks };
-        settings.solve(&system, &rhs, &mut d)?;
+        if let Some(device) = tangent.on_device() {
+            let (gpu, inverse) =
+                (device.gpu(), blocks.prepare_on_device(&*tangent, &*device).ok_or("no block-Jacobi")?);
+            let mut on_device = gpu.zeros(d.len());
+            let system = System { vectors: &**gpu, operator: &*device, inverse: &*inverse };
+            settings.solve(&system, &gpu.vector(&rhs), &mut on_device)?;
+            d = gpu.numbers(&on_device);
+        } else {
+            let system = System { vectors: &Pool::default(), operator: &*tangent, inverse: &blocks };
+            settings.solve(&system, &rhs, &mut d)?;
+        }
         x.iter_mut().zip(d).for_each(|(x, d)| *x += d);
     }
     NonlinearProblem::residual(problem, &x, &mut r)?;
