@@ -43,6 +43,9 @@ impl DeviceUse {
         let damps = has_inertia && simulation.loads.damping.is_some_and(|damping| damping.stiffness > 0.0);
         let sets = if damps { 2 } else { 1 };
         let are_formulas = !mean_stress && simulation.bodies.iter().all(|body| Formula::of(&body.law).is_some());
+        // The changes of a step at the particles take the memory of the linearised laws.
+        let changes = simulation.particles.len() * (D * D + if has_inertia { 3 * D } else { D }) * NUMBER;
+        let rows = (sets * (laws + cells)).max(changes);
         // H_r, V₀ and the body of each particle, and φ̂ for a consistent mass.
         let predicted = if has_inertia && settings.lumping < 1.0 { by_lane * D } else { 0 };
         let solids = if are_formulas { by_lane * (D * D + 1) + by_lane / 2 + predicted } else { 0 };
@@ -64,7 +67,7 @@ impl DeviceUse {
         // The mask of prescribed values, diagonal blocks, and vectors.
         let nodal = nodes * D * (1 + D * NUMBER + NUMBER * vectors);
         let [functions, shared] = connectivity.device_bytes();
-        let bytes = functions + sets * (laws + cells) + solids + masses + levels + filter + followers + nodal;
+        let bytes = functions + rows + solids + masses + levels + filter + followers + nodal;
         Ok(Self { bytes, shared, sent })
     }
 

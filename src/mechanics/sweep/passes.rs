@@ -6,9 +6,8 @@ use super::tiled::Tiled;
 use super::{Connectivity, Each, Group, Mode, Number, Quadratic, Weights};
 use crate::lanes::LANES;
 use crate::parallel::{self, First, Message};
-use crate::pooled::{Element, Pooled};
+use crate::pooled::{Element, Pool, Pooled};
 use crate::tensor::{Tensor, Vector};
-use std::borrow::Cow;
 
 impl<const D: usize> Connectivity<D> {
     /// `f_I += Σ_p q N_I + σ ∇_r N_I` for C components: 1 or D. `point(group, u and L, q and σ)` adds to q and σ, which begin with
@@ -207,7 +206,9 @@ impl<const D: usize> Connectivity<D> {
                     more.chunks_mut(C).zip(&at[1..]).for_each(|(more, at)| more.copy_from_slice(&values(at)));
                 }
             };
-            self.results(Each::Particle(count), &modes, Some(&side_by_side(fields)), results, evaluate);
+            let together = if fields.len() > 1 { side_by_side(fields, self.pool()) } else { Pooled::default() };
+            let fields: &[f64] = if let [field] = fields { bytemuck::cast_slice(field) } else { &together };
+            self.results(Each::Particle(count), &modes, Some(fields), results, evaluate);
         };
         let own = self.own_places();
         // If particles do not lie in the order of the passes, every process needs all of them.
@@ -303,14 +304,11 @@ impl<const D: usize> Connectivity<D> {
     }
 }
 
-/// Nodal fields as plain numbers: node after node, field after field.
-fn side_by_side<'a, const C: usize>(fields: &[&'a [Vector<f64, C>]]) -> Cow<'a, [f64]> {
-    if let &[field] = fields {
-        return Cow::Borrowed(bytemuck::cast_slice(field));
-    }
-    let mut numbers = vec![0.0; fields.iter().map(|field| field.len() * C).sum()];
+/// Nodal fields side by side: node after node, field after field.
+fn side_by_side<const C: usize>(fields: &[&[Vector<f64, C>]], pool: &Pool) -> Pooled<f64> {
+    let mut numbers = pool.unspecified(fields.iter().map(|field| field.len() * C).sum());
     parallel::rows(&mut numbers, fields.len() * C, |node, numbers| {
         numbers.chunks_mut(C).zip(fields).for_each(|(numbers, field)| numbers.copy_from_slice(field[node].as_slice()));
     });
-    Cow::Owned(numbers)
+    numbers
 }
