@@ -47,6 +47,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             let start = Instant::now();
             simulation.advance().map(|_| start.elapsed().as_secs_f64())
         };
+        // Both take the first step, with its shape functions.
         let mut there = simulation.clone();
         there.settings.gpu = Some(gpu.clone());
         let (on_processor, on_gpu) = (seconds(&mut simulation)?, seconds(&mut there)?);

@@ -170,7 +170,7 @@ impl<const D: usize, L, A> Simulation<D, L, A> {
     /// ```
     pub fn rearrange(&mut self, order: &[u32]) {
         self.workspace.connectivity = None;
-        // Where processes share the passes, the arrays of a pass are shorter, and would hold the memory of an array of all particles.
+        // Several processes need no array of all particles in a pass, so the pool shall not keep the memory of one.
         let pool = if self.settings.processes.are_several() { &Pool::default() } else { &self.workspace.pool };
         self.particles.rearrange_in(order, pool);
         let last = self.history.equilibrium.iter_mut().map(|last| &mut last.loads);

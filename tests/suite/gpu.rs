@@ -439,6 +439,23 @@ fn compare_steps<const D: usize>(gpu: &Arc<Gpu>, scene: &Value, steps: usize) ->
     Ok(())
 }
 
+/// A simulation that has taken a step, and keeps its grid, uses a device that it gets now.
+#[test]
+fn a_gpu_is_used_from_the_next_step_on() -> Result<(), Failure> {
+    if !is_emulated("a_gpu_is_used_from_the_next_step_on", &["product_2", "forces_2", "at_particles_2"]) {
+        return Ok(());
+    }
+    // A clone would evaluate its shape functions anew, and with the device.
+    let start = || scene::<2>("rebound.json", &["grid.reset=\"never\""]);
+    let (mut here, mut there) = (start()?, start()?);
+    here.advance()?;
+    there.advance()?;
+    let gpu = there.use_gpu()?;
+    here.advance()?;
+    assert!(!there.advance()?.reset && here.particles == there.particles);
+    Ok(gpu.check()?)
+}
+
 #[test]
 fn free_obstacles_have_the_bits_of_the_processor() -> Result<(), Failure> {
     if !is_emulated("free_obstacles_have_the_bits_of_the_processor", &["point_motions"]) {

@@ -393,7 +393,7 @@ FUNCTION void IN_D(at_particle)(const struct AtParticles *a, i64 group, int lane
 
 GATHER_KERNEL(volumes, Volumes, IN_D(volume))
 GATHER_KERNEL(at_particles, AtParticles, IN_D(at_particle))
-// The tangents of all particles. Rows of empty lanes are not written.
+// The tangents of all particles. Rows of empty lanes keep the zeros that they have before.
 GATHER_KERNEL(linearize, Linearize, IN_D(linearized))
 
 // K u, without lumped masses.

@@ -85,7 +85,7 @@ pub struct Update<'a, const D: usize> {
     changes: OnceCell<Pooled<f64>>,
 }
 
-/// The changes of this process's particles since the last grid reset, Δx and ∇_r φ by columns, and those of the step with inertia, Δv and Δa.
+/// The changes of this process's particles: Δx and ∇_r φ (by columns) since the last grid reset, and with inertia Δv and Δa of the step.
 /// Particles are numbered from the first of this process.
 struct Changes<'a, const D: usize> {
     numbers: &'a [f64],

@@ -145,7 +145,7 @@ impl<const D: usize> WithLanes for Invert<'_, D> {
             // r −= B p
             let neighbours = p[..count].iter().zip(&p[2 * D..]);
             for ((r, p), (before, behind)) in r.iter_mut().zip(&p[D..]).zip(neighbours) {
-                // The zero makes a negative zero positive.
+                // The sum of the neighbours begins with zero, as on a device, so that both have the same bits.
                 *r -= (p * 4.0 + (0.0 + before + behind)) / 6.0;
             }
             let next = 1.0 / (2.0 * sigma - rho);
