@@ -44,7 +44,7 @@ impl Field {
     }
 
     /// Refuses an internal variable that no law has.
-    fn check<const D: usize, L: Law, A>(&self, simulation: &Simulation<D, L, A>) -> Result<(), OutputError> {
+    pub(super) fn check<const D: usize, L: Law, A>(&self, simulation: &Simulation<D, L, A>) -> Result<(), OutputError> {
         let Self::Internal(name) = self else { return Ok(()) };
         let known = internal_variable_names(simulation.bodies.iter().map(|body| &body.law));
         let found = known.contains(&name.as_str());
@@ -132,10 +132,19 @@ impl Field {
         self.check(simulation)?;
         let places = simulation.particles.solid_places();
         let mut out = Vec::with_capacity(places.len() * self.kind().components().len());
-        for place in places {
-            self.append_at(simulation, reference, place as usize, &mut out)?;
-        }
+        self.append_at_all(simulation, reference, &places, &mut out)?;
         Ok(out)
+    }
+
+    /// Appends the components at some places in memory, after [`Self::check`].
+    pub(super) fn append_at_all<const D: usize, L: Law, A>(
+        &self,
+        simulation: &Simulation<D, L, A>,
+        reference: &Reference<D>,
+        places: &[u32],
+        out: &mut Vec<f64>,
+    ) -> Result<(), OutputError> {
+        places.iter().try_for_each(|&place| self.append_at(simulation, reference, place as usize, out))
     }
 }
 

@@ -49,8 +49,8 @@ impl<const D: usize> MovedOutlines<D> {
         Some(Self(lines.collect()))
     }
 
-    /// The outlines at the time of the snapshot `snapshot`, as segments in the order of the lines.
-    pub(crate) fn at(&self, particles: &Particles<D>, snapshot: &Snapshot) -> Snapshot {
+    /// The outlines at the time of `head`, as segments in the order of the lines.
+    pub(crate) fn at(&self, particles: &Particles<D>, head: &Snapshot) -> Snapshot {
         let places = particles.places();
         let (mut points, mut bodies) = (Vec::new(), Vec::new());
         for line in &self.0 {
@@ -60,7 +60,7 @@ impl<const D: usize> MovedOutlines<D> {
             bodies.resize(points.len(), f64::from(line.body));
         }
         let arrays = vec![Array::scalar("body", bodies, true)];
-        Snapshot { time: snapshot.time, background: snapshot.background, points, arrays, corners: 2 }
+        Snapshot { points, arrays, corners: 2, ..head.clone() }
     }
 }
 

@@ -20,7 +20,7 @@ impl<const D: usize> Outlines<D> {
     }
 
     /// The outlines in the poses of a time, with the number of the obstacle of each corner.
-    pub(crate) fn at(&self, contacts: &Contacts<D>, time: f64, particles: &Snapshot) -> Snapshot {
+    pub(crate) fn at(&self, contacts: &Contacts<D>, time: f64, head: &Snapshot) -> Snapshot {
         let (mut points, mut numbers) = (Vec::new(), Vec::new());
         for (number, (obstacle, corners)) in contacts.obstacles.iter().zip(&self.0).enumerate() {
             let pose = obstacle.pose(time);
@@ -28,7 +28,7 @@ impl<const D: usize> Outlines<D> {
             numbers.resize(points.len(), number as f64);
         }
         let arrays = vec![Array::scalar("obstacle", numbers, true)];
-        Snapshot { time: particles.time, background: particles.background, points, arrays, corners: D }
+        Snapshot { points, arrays, corners: D, ..head.clone() }
     }
 }
 

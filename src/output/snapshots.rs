@@ -5,7 +5,7 @@ use super::fields::padded;
 use super::moved_outlines::MovedOutlines;
 use super::outlines::Outlines;
 use super::pvd::{self, SERIES};
-use super::vtu::{Array, Background, Snapshot};
+use super::vtu::{Background, Column, Snapshot};
 use super::{OutputError, Reference, surfaces};
 use crate::clock::Clock;
 use crate::field::{Field, Kind};
@@ -117,7 +117,7 @@ impl<const D: usize> Snapshots<D> {
     }
 
     /// Writes the present state, unless it is already written.
-    pub(crate) fn write<L: Law, A>(
+    pub(crate) fn write<L: Law, A: Sync>(
         &mut self,
         simulation: &Simulation<D, L, A>,
         reference: &Reference<D>,
@@ -126,28 +126,35 @@ impl<const D: usize> Snapshots<D> {
         if self.mark.last == Some(step) {
             return Ok(());
         }
-        let particles = snapshot(simulation, reference, &self.fields)?;
+        let head = head(simulation);
         if let Some(outlines) = &self.outlines {
-            let outlines = outlines.at(&simulation.loads.contacts, simulation.clock.time(), &particles);
-            self.add(1, &outlines)?;
+            let outlines = outlines.at(&simulation.loads.contacts, simulation.clock.time(), &head);
+            self.add(1, &head, |path| outlines.write(path))?;
         }
         if simulation.loads.contacts.exist() {
-            self.add(2, &surfaces::snapshot(simulation, &particles))?;
+            self.add(2, &head, |path| surfaces::snapshot(simulation, &head).write(path))?;
         }
         if let Some(bodies) = &self.bodies {
-            self.add(3, &bodies.at(&simulation.particles, &particles))?;
+            let bodies = bodies.at(&simulation.particles, &head);
+            self.add(3, &head, |path| bodies.write(path))?;
         }
-        self.add(0, &particles)?;
+        let fields = self.fields.clone();
+        self.add(0, &head, |path| write_particles(path, &head, simulation, reference, &fields))?;
         self.mark.written += 1;
         self.mark.last = Some(step);
         Ok(())
     }
 
     /// Writes the next file of a series, given by its number in [`SERIES`], and the entry of this file.
-    fn add(&mut self, series: usize, snapshot: &Snapshot) -> Result<(), OutputError> {
+    fn add(
+        &mut self,
+        series: usize,
+        head: &Snapshot,
+        write: impl FnOnce(&Path) -> Result<(), OutputError>,
+    ) -> Result<(), OutputError> {
         let file = name(SERIES[series], self.mark.written);
-        snapshot.write(&self.directory.join(&file))?;
-        self.entries[series] += &pvd::entry(snapshot.time, &file);
+        write(&self.directory.join(&file))?;
+        self.entries[series] += &pvd::entry(head.time, &file);
         pvd::write(&pvd::file(&self.directory, SERIES[series]), &self.entries[series])
     }
 }
@@ -158,23 +165,10 @@ pub(crate) fn multiples(clock: &Clock, every: f64) -> f64 {
     ((clock.time() + 1e-6 * clock.nominal()) / every).floor()
 }
 
-/// A snapshot of the particles, in the order of their ids, with the given fields. No other field is computed.
-pub(crate) fn snapshot<const D: usize, L: Law, A>(
-    simulation: &Simulation<D, L, A>,
-    reference: &Reference<D>,
-    fields: &[Field],
-) -> Result<Snapshot, OutputError> {
-    let (grid, particles) = (&simulation.grid, &simulation.particles);
-    let places = particles.solid_places();
-    let arrays = fields.iter().map(|field| {
-        Ok(Array {
-            name: field.name().to_owned(),
-            components: field.kind().components().iter().map(|&name| name.to_owned()).collect(),
-            values: field.values(simulation, reference)?,
-            is_index: field.kind() == Kind::Index,
-        })
-    });
-    Ok(Snapshot {
+/// The time and the grid of a snapshot.
+fn head<const D: usize, L, A>(simulation: &Simulation<D, L, A>) -> Snapshot {
+    let grid = &simulation.grid;
+    Snapshot {
         time: simulation.clock.time(),
         background: Background {
             dimension: D as u32,
@@ -182,8 +176,33 @@ pub(crate) fn snapshot<const D: usize, L: Law, A>(
             spacing: grid.spacing,
             cells: std::array::from_fn(|k| grid.cells.get(k).copied().unwrap_or(0)),
         },
-        points: places.iter().map(|&p| padded(&particles.position[p as usize])).collect(),
-        arrays: arrays.collect::<Result<_, OutputError>>()?,
+        points: Vec::new(),
+        arrays: Vec::new(),
         corners: 1,
+    }
+}
+
+/// Writes the given fields of the particles, in the order of their ids. No other field is computed.
+fn write_particles<const D: usize, L: Law, A: Sync>(
+    path: &Path,
+    head: &Snapshot,
+    simulation: &Simulation<D, L, A>,
+    reference: &Reference<D>,
+    fields: &[Field],
+) -> Result<(), OutputError> {
+    let places = &simulation.particles.solid_places();
+    let names = |field: &Field| field.kind().components().iter().map(|&name| name.to_owned()).collect();
+    let components: Vec<Vec<String>> = fields.iter().map(names).collect();
+    let mut columns = Vec::new();
+    for (field, components) in fields.iter().zip(&components) {
+        field.check(simulation)?;
+        let about = (field.name(), components.as_slice(), field.kind() == Kind::Index);
+        columns.push(Column::new(about, places.len(), |rows, out| {
+            field.append_at_all(simulation, reference, &places[rows], out)
+        }));
+    }
+    head.write_columns(path, columns, places.len(), |rows, out| {
+        out.extend(places[rows].iter().flat_map(|&p| padded(&simulation.particles.position[p as usize])));
+        Ok(())
     })
 }

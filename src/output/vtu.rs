@@ -5,15 +5,23 @@
 
 use super::OutputError;
 use super::files::write_atomically;
+use super::history::AXES;
 use crate::field::column;
 use crate::parallel;
 use flate2::Compression;
 use flate2::read::{ZlibDecoder, ZlibEncoder};
-use std::io::{Read, Write};
+use std::io::{Error, Read, Seek, SeekFrom, Write};
+use std::ops::Range;
 use std::path::Path;
 
-/// Bytes of an uncompressed block.
+/// The most bytes of an uncompressed block, which has whole rows.
 const BLOCK: usize = 1 << 16;
+
+/// Blocks that are in memory at the same time.
+const AT_ONCE: usize = 64;
+
+/// Digits of an offset. A reader skips leading zeros.
+const DIGITS: usize = 15;
 
 /// VTK's types of cells with one point, two and three: vertex, line and triangle.
 pub(super) const TYPES: [u8; 3] = [1, 3, 5];
@@ -46,11 +54,7 @@ impl Array {
 
     /// The values as a file holds them.
     pub(super) fn bytes(&self) -> Vec<u8> {
-        if self.is_index {
-            self.values.iter().flat_map(|&x| (x as u32).to_le_bytes()).collect()
-        } else {
-            bytes(&self.values)
-        }
+        to_bytes(&self.values, self.is_index)
     }
 
     /// The names of the components, as in a table.
@@ -96,41 +100,107 @@ pub struct Snapshot {
     pub corners: usize,
 }
 
-/// A file under construction: the XML, and the appended data to which it refers by offsets.
-#[derive(Default)]
-struct Parts {
-    xml: String,
-    data: Vec<u8>,
+/// `(rows, out)`: appends the bytes of some rows of a column.
+type Fill<'a> = dyn Fn(Range<usize>, &mut Vec<u8>) -> Result<(), OutputError> + Sync + 'a;
+
+/// A column of a file: an array whose bytes are computed when they are written.
+pub(super) struct Column<'a> {
+    vtk_type: &'static str,
+    name: &'a str,
+    components: &'a [String],
+    rows: usize,
+    /// Bytes of a row.
+    width: usize,
+    fill: Box<Fill<'a>>,
 }
 
-impl Parts {
-    /// An array: its XML element, and as data `[blocks, block size, size of the last block if smaller, compressed sizes …]` and the
-    /// compressed blocks.
-    fn array(&mut self, vtk_type: &str, name: &str, components: &[impl AsRef<str>], bytes: &[u8]) {
-        self.xml += &format!(r#"<DataArray type="{vtk_type}" Name="{name}""#);
-        // Without NumberOfComponents, readers give a scalar as a plain list.
-        if components.len() != 1 {
-            self.xml += &format!(r#" NumberOfComponents="{}""#, components.len());
-        }
-        for (k, component) in components.iter().map(AsRef::as_ref).enumerate().filter(|(_, name)| !name.is_empty()) {
-            self.xml += &format!(r#" ComponentName{k}="{component}""#);
-        }
-        self.xml += &format!(" format=\"appended\" offset=\"{}\"/>\n", self.data.len());
-        let blocks = parallel::collect(bytes.chunks(BLOCK), &|block| compressed(block, Compression::fast()));
-        let header = [blocks.len(), BLOCK, bytes.len() % BLOCK].into_iter().chain(blocks.iter().map(Vec::len));
-        self.data.extend(header.flat_map(|word| (word as u64).to_le_bytes()));
-        self.data.extend(blocks.iter().flatten());
+impl<'a> Column<'a> {
+    /// A column of so many rows of numbers. `fill(rows, out)` appends all components of some rows. With `is_index`, all of them are whole.
+    pub(super) fn new(
+        (name, components, is_index): (&'a str, &'a [String], bool),
+        rows: usize,
+        fill: impl Fn(Range<usize>, &mut Vec<f64>) -> Result<(), OutputError> + Sync + 'a,
+    ) -> Self {
+        let (vtk_type, size) = if is_index { ("UInt32", size_of::<u32>()) } else { ("Float64", size_of::<f64>()) };
+        let fill = move |rows: Range<usize>, out: &mut Vec<u8>| {
+            let mut values = Vec::with_capacity(rows.len() * components.len());
+            fill(rows, &mut values)?;
+            out.extend(to_bytes(&values, is_index));
+            Ok(())
+        };
+        Self { vtk_type, name, components, rows, width: components.len() * size, fill: Box::new(fill) }
     }
 
-    /// An array of field data, as text.
-    fn field(&mut self, vtk_type: &str, name: &str, numbers: &[impl std::fmt::Debug]) {
-        let text: Vec<String> = numbers.iter().map(|x| format!("{x:?}")).collect();
-        self.xml += &format!(
-            "<DataArray type=\"{vtk_type}\" Name=\"{name}\" NumberOfTuples=\"{}\" format=\"ascii\">{}</DataArray>\n",
-            numbers.len(),
-            text.join(" ")
-        );
+    /// A column that describes cells.
+    fn of_cells(
+        (vtk_type, name, width): (&'static str, &'a str, usize),
+        rows: usize,
+        fill: impl Fn(Range<usize>, &mut Vec<u8>) + Sync + 'a,
+    ) -> Self {
+        let fill = move |rows: Range<usize>, out: &mut Vec<u8>| {
+            fill(rows, out);
+            Ok(())
+        };
+        Self { vtk_type, name, components: &[], rows, width, fill: Box::new(fill) }
     }
+
+    /// The XML element, up to the digits of the offset of the data.
+    fn tag(&self) -> String {
+        let Self { vtk_type, name, components, .. } = self;
+        let mut tag = format!(r#"<DataArray type="{vtk_type}" Name="{name}""#);
+        // Without NumberOfComponents, readers give a scalar as a plain list.
+        if components.len() > 1 {
+            tag += &format!(r#" NumberOfComponents="{}""#, components.len());
+        }
+        for (k, component) in components.iter().enumerate().filter(|(_, name)| !name.is_empty()) {
+            tag += &format!(r#" ComponentName{k}="{component}""#);
+        }
+        tag + r#" format="appended" offset=""#
+    }
+
+    /// Writes the data: `[blocks, block size, size of the last block if smaller, compressed sizes …]` and the compressed blocks. Few blocks are
+    /// in memory at a time.
+    fn write(&self, file: &mut (impl Write + Seek)) -> std::io::Result<()> {
+        let rows = BLOCK / self.width;
+        let blocks = self.rows.div_ceil(rows);
+        let words = [blocks, rows * self.width, self.rows % rows * self.width];
+        let table = |sizes: Vec<usize>| -> Vec<u8> {
+            words.into_iter().chain(sizes).flat_map(|word| (word as u64).to_le_bytes()).collect()
+        };
+        let start = file.stream_position()?;
+        file.write_all(&table(vec![0; blocks]))?;
+        let mut sizes = Vec::new();
+        for first in (0..blocks).step_by(AT_ONCE) {
+            let block = |number: usize| {
+                let mut block = Vec::with_capacity(BLOCK);
+                let filled = (self.fill)(number * rows..self.rows.min((number + 1) * rows), &mut block);
+                filled.map(|()| compressed(&block, Compression::fast()))
+            };
+            for block in parallel::collect(first..blocks.min(first + AT_ONCE), &block) {
+                let block = block.map_err(Error::other)?;
+                sizes.push(block.len());
+                file.write_all(&block)?;
+            }
+        }
+        let end = file.stream_position()?;
+        file.seek(SeekFrom::Start(start))?;
+        file.write_all(&table(sizes))?;
+        file.seek(SeekFrom::Start(end)).map(drop)
+    }
+}
+
+/// The numbers as a file holds them.
+fn to_bytes(values: &[f64], is_index: bool) -> Vec<u8> {
+    if is_index { values.iter().flat_map(|&x| (x as u32).to_le_bytes()).collect() } else { bytes(values) }
+}
+
+/// An array of field data, as text.
+fn field(vtk_type: &str, name: &str, numbers: &[impl std::fmt::Debug]) -> String {
+    let text: Vec<String> = numbers.iter().map(|x| format!("{x:?}")).collect();
+    let (count, text) = (numbers.len(), text.join(" "));
+    format!(
+        "<DataArray type=\"{vtk_type}\" Name=\"{name}\" NumberOfTuples=\"{count}\" format=\"ascii\">{text}</DataArray>\n"
+    )
 }
 
 /// A block in the format of zlib.
@@ -152,37 +222,90 @@ impl Snapshot {
     /// # Errors
     /// The operating system refuses.
     pub(crate) fn write(&self, path: &Path) -> Result<(), OutputError> {
-        let mut parts = Parts::default();
-        parts.xml += "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" \
-             header_type=\"UInt64\" compressor=\"vtkZLibDataCompressor\">\n<UnstructuredGrid>\n<FieldData>\n";
-        let Background { dimension, origin, spacing, cells } = &self.background;
-        parts.field("Float64", "TimeValue", &[self.time]);
-        parts.field("UInt32", "grid_dimension", &[dimension]);
-        parts.field("Float64", "grid_origin", origin);
-        parts.field("Float64", "grid_spacing", &[spacing]);
-        parts.field("UInt32", "grid_cells", cells);
-        let (count, corners) = (self.points.len(), self.corners.clamp(1, TYPES.len()));
-        let cells = count / corners;
-        parts.xml +=
-            &format!("</FieldData>\n<Piece NumberOfPoints=\"{count}\" NumberOfCells=\"{cells}\">\n<PointData>\n");
-        for array in &self.arrays {
-            let vtk_type = if array.is_index { "UInt32" } else { "Float64" };
-            parts.array(vtk_type, &array.name, &array.components, &array.bytes());
+        fn copied(values: &[f64], width: usize) -> impl Fn(Range<usize>, &mut Vec<f64>) -> Result<(), OutputError> {
+            move |rows, out| {
+                out.extend(&values[rows.start * width..rows.end * width]);
+                Ok(())
+            }
         }
-        parts.xml += "</PointData>\n<Points>\n";
-        parts.array("Float64", "Points", &["x", "y", "z"], &bytes(self.points.as_flattened()));
-        parts.xml += "</Points>\n<Cells>\n";
-        let ends = (1..=cells).map(|cell| (cell * corners) as i64).flat_map(i64::to_le_bytes).collect::<Vec<u8>>();
-        let all = (0..count as i64).flat_map(i64::to_le_bytes).collect::<Vec<u8>>();
-        parts.array("Int64", "connectivity", &[""], &all);
-        parts.array("Int64", "offsets", &[""], &ends);
-        parts.array("UInt8", "types", &[""], &vec![TYPES[corners - 1]; cells]);
-        parts.xml += "</Cells>\n</Piece>\n</UnstructuredGrid>\n<AppendedData encoding=\"raw\">\n_";
+        let count = self.points.len();
+        let arrays = self.arrays.iter().map(|Array { name, components, values, is_index }| {
+            Column::new((name, components, *is_index), count, copied(values, components.len()))
+        });
+        let arrays = arrays.collect();
+        self.write_columns(path, arrays, count, copied(self.points.as_flattened(), 3))
+    }
+
+    /// Writes a file with these arrays, and so many points, instead of its own.
+    ///
+    /// # Errors
+    /// A value cannot be computed, or the operating system refuses.
+    pub(super) fn write_columns(
+        &self,
+        path: &Path,
+        arrays: Vec<Column<'_>>,
+        count: usize,
+        points: impl Fn(Range<usize>, &mut Vec<f64>) -> Result<(), OutputError> + Sync,
+    ) -> Result<(), OutputError> {
+        let corners = self.corners.clamp(1, TYPES.len());
+        let (cells, axes) = (count / corners, AXES.map(str::to_owned));
+        let numbers = |of: Range<usize>, step: usize| of.flat_map(move |k| ((k * step) as i64).to_le_bytes());
+        let cells_of = [
+            Column::of_cells(("Int64", "connectivity", 8), count, |rows, out| out.extend(numbers(rows, 1))),
+            Column::of_cells(("Int64", "offsets", 8), cells, |rows, out| {
+                out.extend(numbers(rows.start + 1..rows.end + 1, corners));
+            }),
+            Column::of_cells(("UInt8", "types", 1), cells, |rows, out| {
+                out.resize(out.len() + rows.len(), TYPES[corners - 1]);
+            }),
+        ];
+        let points = [Column::new(("Points", &axes, false), count, points)];
         write_atomically(path, |file| {
-            file.write_all(parts.xml.as_bytes())?;
-            file.write_all(&parts.data)?;
-            file.write_all(b"\n</AppendedData>\n</VTKFile>\n")
+            let piece = format!("<Piece NumberOfPoints=\"{count}\" NumberOfCells=\"{cells}\">\n<PointData>\n");
+            file.write_all((self.head() + &piece).as_bytes())?;
+            let sections = [
+                (&arrays[..], "</PointData>\n<Points>\n"),
+                (&points, "</Points>\n<Cells>\n"),
+                (&cells_of, "</Cells>\n</Piece>\n</UnstructuredGrid>\n<AppendedData encoding=\"raw\">\n_"),
+            ];
+            // The offset of each column, as digits, and its place.
+            let mut offsets = Vec::new();
+            for (columns, end) in sections {
+                for column in columns {
+                    file.write_all(column.tag().as_bytes())?;
+                    offsets.push((file.stream_position()?, 0));
+                    write!(file, "{:0DIGITS$}\"/>\n", 0)?;
+                }
+                file.write_all(end.as_bytes())?;
+            }
+            let data = file.stream_position()?;
+            for ((_, offset), column) in offsets.iter_mut().zip(sections.iter().flat_map(|(columns, _)| *columns)) {
+                *offset = file.stream_position()? - data;
+                column.write(file)?;
+            }
+            file.write_all(b"\n</AppendedData>\n</VTKFile>\n")?;
+            for (place, offset) in offsets {
+                file.seek(SeekFrom::Start(place))?;
+                write!(file, "{offset:0DIGITS$}")?;
+            }
+            Ok(())
         })
+    }
+
+    /// The XML before the points.
+    fn head(&self) -> String {
+        let Background { dimension, origin, spacing, cells } = &self.background;
+        [
+            "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" \
+             header_type=\"UInt64\" compressor=\"vtkZLibDataCompressor\">\n<UnstructuredGrid>\n<FieldData>\n",
+            &field("Float64", "TimeValue", &[self.time]),
+            &field("UInt32", "grid_dimension", &[dimension]),
+            &field("Float64", "grid_origin", origin),
+            &field("Float64", "grid_spacing", &[spacing]),
+            &field("UInt32", "grid_cells", cells),
+            "</FieldData>\n",
+        ]
+        .concat()
     }
 
     /// Reads a file that this program has written.
@@ -271,7 +394,7 @@ fn read_array(tag: &str, data: &[u8], count: usize) -> Result<Array, String> {
     Ok(Array { name: name.to_owned(), components: (0..width).map(component).collect(), values, is_index })
 }
 
-/// Decompresses the data of [`Parts::array`].
+/// Decompresses the data of a column.
 fn inflated(data: &[u8]) -> Option<Vec<u8>> {
     let word = |k: usize| {
         let bytes = data.get(k.checked_mul(8)?..)?.first_chunk::<8>()?;
@@ -334,19 +457,27 @@ mod tests {
     /// header holds the block count, the block size, the size of a partial last block (0 if it is whole) and the compressed sizes.
     #[test]
     fn the_layout_is_that_of_vtk() -> Result<(), Box<dyn std::error::Error>> {
-        let mut parts = Parts::default();
-        parts.array("UInt8", "before", &[""], b"before");
-        let bytes: Vec<u8> = (0..2 * BLOCK + 5).map(|k| (k % 251) as u8).collect();
-        let offset = parts.data.len();
-        parts.array("UInt8", "bytes", &[""], &bytes);
-        assert!(parts.xml.ends_with(&format!("Name=\"bytes\" format=\"appended\" offset=\"{offset}\"/>\n")));
-        let words: Vec<u64> =
-            parts.data[offset..].as_chunks().0.iter().take(6).map(|&word| u64::from_le_bytes(word)).collect();
-        assert_eq!(words[..3], [3, BLOCK as u64, 5]);
-        assert_eq!(words[3..].iter().sum::<u64>() as usize, parts.data.len() - offset - 6 * 8);
+        let (rows, names) = (2 * (BLOCK / 24) + 5, AXES.map(str::to_owned));
+        let number = |k: usize| (k % 251) as f64;
+        let column = Column::new(("v", &names, false), rows, |rows, out| {
+            out.extend((3 * rows.start..3 * rows.end).map(number));
+            Ok(())
+        });
+        let mut file = std::io::Cursor::new(b"before".to_vec());
+        file.seek(SeekFrom::End(0))?;
+        column.write(&mut file)?;
+        let (position, data) = (file.position() as usize, &file.into_inner()[6..]);
+        let words: Vec<u64> = data.as_chunks().0.iter().take(6).map(|&word| u64::from_le_bytes(word)).collect();
+        assert_eq!(words[..3], [3, BLOCK as u64 / 24 * 24, 5 * 24]);
+        assert_eq!((words[3..].iter().sum::<u64>() as usize, position), (data.len() - 6 * 8, data.len() + 6));
         let mut first = Vec::new();
-        ZlibDecoder::new(&parts.data[offset + 48..][..words[3] as usize]).read_to_end(&mut first)?;
-        assert_eq!(first, bytes[..BLOCK]);
+        ZlibDecoder::new(&data[48..][..words[3] as usize]).read_to_end(&mut first)?;
+        assert_eq!(first, bytes(&(0..BLOCK / 24 * 3).map(number).collect::<Vec<_>>()));
+        assert!(
+            column
+                .tag()
+                .starts_with("<DataArray type=\"Float64\" Name=\"v\" NumberOfComponents=\"3\" ComponentName0=\"x\"")
+        );
         Ok(())
     }
 
