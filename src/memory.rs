@@ -28,9 +28,26 @@ pub(crate) fn give_back() {
     malloc_trim(0);
 }
 
-/// Other systems have no such call.
+/// Lets the program give arrays from 1 MiB on back to the operating system when it frees them. glibc raises this size, to 32 MiB, when such arrays are
+/// freed: of 512,000 particles in four processes, each then keeps 25 MiB more.
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+#[allow(unsafe_code)]
+pub(crate) fn give_arrays_back() {
+    use std::ffi::c_int;
+    unsafe extern "C" {
+        safe fn mallopt(parameter: c_int, value: c_int) -> c_int;
+    }
+    const M_MMAP_THRESHOLD: c_int = -3;
+    mallopt(M_MMAP_THRESHOLD, 1 << 20);
+}
+
+/// Other systems have no such calls.
 #[cfg(not(all(target_os = "linux", target_env = "gnu")))]
 pub(crate) fn give_back() {}
+
+/// Other systems have no such calls.
+#[cfg(not(all(target_os = "linux", target_env = "gnu")))]
+pub(crate) fn give_arrays_back() {}
 
 /// `Max address space` of /proc/self/limits less `VmSize` of /proc/self/status, in bytes.
 fn address_space(limits: &str, status: &str) -> Option<u64> {

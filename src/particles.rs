@@ -1,7 +1,7 @@
 //! The particles: structure of arrays, and the bodies they belong to.
 
 use crate::material::{Law, MaterialState, VolumeResponse};
-use crate::parallel;
+use crate::parallel::{self, Change, Parts, Processes};
 use crate::pooled::{Element, Pool};
 use crate::scalar::Real;
 use crate::tensor::{Deformation, Tensor, Vector};
@@ -65,6 +65,9 @@ impl<L: Law> Body<L> {
 /// Particles lie in memory nearly in the order of the loop over cells, and a step may rearrange them. The `id` identifies a particle in
 /// results, probes and messages.
 ///
+/// In a run of several processes, the arrays v, a, H and `memory` hold the particles of this process alone, see
+/// [`Simulation::collect_particles`](crate::simulation::Simulation::collect_particles).
+///
 /// ```
 /// use bfree::particles::Particles;
 /// use bfree::tensor::Vector;
@@ -107,6 +110,8 @@ pub struct Particles<const D: usize> {
     pub(crate) reference: Option<Configuration<D>>,
     /// The outlines of the undeformed bodies in the plane, for pictures. Empty if a body has no outline.
     pub(crate) outlines: Vec<Outline<D>>,
+    /// The particles of each process.
+    pub(crate) parts: Parts,
 }
 
 /// A closed line around an undeformed body of the plane, or around a hole in it.
@@ -135,13 +140,20 @@ pub(crate) struct Configuration<const D: usize> {
 pub(crate) struct Reference<'a, const D: usize> {
     /// x
     pub position: &'a [Vector<f64, D>],
-    /// H = F − I
-    pub displacement_gradient: &'a [Tensor<f64, D>],
+    /// H = F − I of the particles of this process.
+    displacement_gradient: &'a [Tensor<f64, D>],
+    parts: &'a Parts,
     dilatation: &'a [f64],
     volume: &'a [f64],
 }
 
-impl<const D: usize> Reference<'_, D> {
+impl<'a, const D: usize> Reference<'a, D> {
+    /// H = F − I of the particle at index `p`.
+    #[inline(always)]
+    pub(crate) fn displacement_gradient(&self, p: usize) -> &'a Tensor<f64, D> {
+        &self.displacement_gradient[self.parts.here(p)]
+    }
+
     /// θ − 1 of the particle at index `p`.
     pub(crate) fn dilatation(&self, p: usize) -> f64 {
         self.dilatation.get(p).copied().unwrap_or(0.0)
@@ -149,7 +161,7 @@ impl<const D: usize> Reference<'_, D> {
 
     /// V₀ J of the particle at index `p`.
     pub(crate) fn volume(&self, p: usize) -> f64 {
-        self.volume[p] * Deformation::new(self.displacement_gradient[p]).jacobian
+        self.volume[p] * Deformation::new(*self.displacement_gradient(p)).jacobian
     }
 }
 
@@ -240,7 +252,7 @@ impl<const D: usize> Particles<D> {
             None => (&self.position, &self.displacement_gradient, &self.dilatation),
             Some(stored) => (&stored.position, &stored.displacement_gradient, &stored.dilatation),
         };
-        Reference { position, displacement_gradient, dilatation, volume: &self.volume }
+        Reference { position, displacement_gradient, parts: &self.parts, dilatation, volume: &self.volume }
     }
 
     /// Stores the present configuration as the reference configuration, unless there is one.
@@ -257,8 +269,9 @@ impl<const D: usize> Particles<D> {
     /// The state at t_n of the particle at the place `p` in memory, for a step of length `dt`.
     #[inline(always)]
     pub fn state(&self, p: usize, dt: f64) -> MaterialState<'_, f64, D> {
-        let internal = &self.memory[p * self.variable_count..(p + 1) * self.variable_count];
-        MaterialState::new(self.displacement_gradient[p]).in_step(dt, internal)
+        let here = self.here(p);
+        let internal = &self.memory[here * self.variable_count..(here + 1) * self.variable_count];
+        MaterialState::new(self.displacement_gradient[here]).in_step(dt, internal)
     }
 
     /// Calls [`Self::set_internal_to_rest`] if a law has more internal variables than there is room for. Bodies set up in code need it.
@@ -309,11 +322,12 @@ impl<const D: usize> Particles<D> {
         self.id.iter().position(|&one| one as usize == id)
     }
 
-    /// The same particles in the order of their ids.
+    /// The same particles in the order of their ids. This process must have all of them.
     ///
     /// Example: [`Self::rearrange`].
     pub fn by_id(&self) -> Self {
         let mut sorted = self.clone();
+        sorted.parts = Parts::default();
         sorted.rearrange(&self.places());
         sorted
     }
@@ -334,27 +348,81 @@ impl<const D: usize> Particles<D> {
     /// assert_eq!(particles.by_id().position.iter().map(|x| x[0]).collect::<Vec<_>>(), [0.0, 1.0, 2.0]);
     /// ```
     pub fn rearrange(&mut self, order: &[u32]) {
-        self.rearrange_in(order, &Pool::default());
+        self.rearrange_in(order, &Pool::default(), true);
     }
 
-    /// [`Self::rearrange`] with memory of a pool for one array at a time.
-    pub(crate) fn rearrange_in(&mut self, order: &[u32], pool: &Pool) {
+    /// [`Self::rearrange`] with memory of a pool for one array at a time. Arrays that a process may have of its own particles alone are moved only
+    /// if they are `whole`; otherwise [`Self::share_out`] moves them.
+    pub(crate) fn rearrange_in(&mut self, order: &[u32], pool: &Pool, whole: bool) {
         let Self {
             position, velocity, acceleration, displacement_gradient, volume, mass, body, id, dilatation, ..
         } = self;
-        [position, velocity, acceleration].into_iter().for_each(|vectors| permute(vectors, 1, order, pool));
-        permute(displacement_gradient, 1, order, pool);
+        permute(position, 1, order, pool);
         [volume, mass, dilatation].into_iter().for_each(|numbers| permute(numbers, 1, order, pool));
         for numbers in [body, id] {
             let before = parallel::copy_of(numbers);
             parallel::each(numbers, |place, number| *number = before[order[place] as usize]);
         }
-        permute(&mut self.memory, self.variable_count, order, pool);
+        if whole {
+            [velocity, acceleration].into_iter().for_each(|vectors| permute(vectors, 1, order, pool));
+            permute(displacement_gradient, 1, order, pool);
+            permute(&mut self.memory, self.variable_count, order, pool);
+        }
         if let Some(Configuration { position, displacement_gradient, dilatation }) = &mut self.reference {
             permute(position, 1, order, pool);
-            permute(displacement_gradient, 1, order, pool);
+            if whole {
+                permute(displacement_gradient, 1, order, pool);
+            }
             mutant!("mean dilatation: means of a kept grid stay where particles were": { return; });
             permute(dilatation, 1, order, pool);
+        }
+    }
+
+    /// Whether this process has v, a, H and the internal variables of all particles at all times.
+    pub(crate) fn are_whole(&self) -> bool {
+        self.parts.are_whole()
+    }
+
+    /// Whether this process has v, a, H and the internal variables of all particles now.
+    pub(crate) fn are_all_here(&self) -> bool {
+        self.displacement_gradient.len() == self.len()
+    }
+
+    /// The index of a particle of this process in the arrays of v, a and H.
+    #[inline(always)]
+    pub(crate) fn here(&self, p: usize) -> usize {
+        self.parts.here(p)
+    }
+
+    /// Changes the arrays that a process may have of its own particles alone.
+    fn change(&mut self, (change, after): (impl Change, Parts)) {
+        [&mut self.velocity, &mut self.acceleration].into_iter().for_each(|vectors| change.apply(vectors, 1));
+        change.apply(&mut self.displacement_gradient, 1);
+        change.apply(&mut self.memory, self.variable_count);
+        if let Some(Configuration { displacement_gradient, .. }) = &mut self.reference {
+            change.apply(displacement_gradient, 1);
+        }
+        self.parts = after;
+    }
+
+    /// Lets each process have the particles between its two `bounds`, after [`Self::rearrange_in`] has put all other arrays into this order.
+    pub(crate) fn share_out(&mut self, order: Option<&[u32]>, bounds: Vec<usize>, processes: &Processes) {
+        self.change(self.parts.moved(order, bounds, processes));
+    }
+
+    /// Fills in the particles of other processes in process 0, which has them until its next step.
+    pub(crate) fn collect(&mut self, processes: &Processes) {
+        self.keep_own(processes);
+        if !self.are_whole() {
+            let parts = self.parts.clone();
+            self.change(parts.collected(processes));
+        }
+    }
+
+    /// Forgets the particles of other processes.
+    pub(crate) fn keep_own(&mut self, processes: &Processes) {
+        if !self.are_whole() {
+            self.change(self.parts.kept(processes));
         }
     }
 
@@ -388,7 +456,7 @@ impl<const D: usize> Particles<D> {
 
     /// V₀ J, the present volume of a particle.
     pub(crate) fn present_volume(&self, p: usize) -> f64 {
-        self.volume[p] * Deformation::new(self.displacement_gradient[p]).jacobian
+        self.volume[p] * Deformation::new(self.displacement_gradient[self.here(p)]).jacobian
     }
 
     /// Σ ½ m v·v

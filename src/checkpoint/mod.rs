@@ -44,6 +44,7 @@ mod container;
 mod difference;
 mod state;
 
+use crate::clock::Clock;
 use crate::clock::Reached;
 use crate::output::files::write_atomically;
 use crate::output::snapshots::multiples;
@@ -216,12 +217,16 @@ impl Checkpoints {
         simulation: &Simulation<D, L, A>,
         recorder: &mut Recorder<D>,
     ) -> Result<(), CheckpointError> {
-        let passed = multiples(&simulation.clock, self.every);
-        if self.passed.is_some_and(|before| passed <= before) {
+        if !self.are_due(&simulation.clock) {
             return Ok(());
         }
-        self.passed = Some(passed);
+        self.passed = Some(multiples(&simulation.clock, self.every));
         self.write(simulation, recorder)
+    }
+
+    /// Whether the time has reached a multiple of the time between checkpoints since the last one that was due.
+    pub(crate) fn are_due(&self, clock: &Clock) -> bool {
+        self.passed.is_none_or(|before| multiples(clock, self.every) > before)
     }
 
     /// Writes a checkpoint, unless the last checkpoint holds the same state.

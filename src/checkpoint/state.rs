@@ -52,6 +52,7 @@ pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) 
         dilatation,
         reference,
         outlines: _,
+        parts: _,
     } = particles;
     let mut arrays = of_history(history, loads.prescribed.len());
     arrays.extend([

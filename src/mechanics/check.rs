@@ -1,7 +1,7 @@
 //! The tangent check of a run. Each piece of the tangent, through the products that the solver applies, is compared with the derivative of
 //! the residual by dual numbers.
 
-use crate::material::Law;
+use crate::material::{Law, MaterialState};
 use crate::mechanics::constitutive::Part;
 use crate::mechanics::kinematics::Kinematics;
 use crate::mechanics::mixed::MixedTangent;
@@ -218,9 +218,15 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     /// Lets the laws of a few particles compare what they claim with differences.
     fn check_claims(&self, phi: &[Vector<f64, D>]) -> Result<(), CheckError> {
         let (particles, connectivity) = (self.step.particles, self.step.connectivity);
-        for p in (0..particles.len()).step_by(particles.len().div_ceil(CLAIMS).max(1)) {
+        let some = || (0..particles.len()).step_by(particles.len().div_ceil(CLAIMS).max(1));
+        let state = |p| {
             let h = Kinematics(particles).displacement_gradient(p, &connectivity.gradient_at(p, phi));
-            let at = particles.state(p, self.step.dt).deformed(h);
+            (h, particles.state(p, self.step.dt).internal.to_vec())
+        };
+        // Every process hears of every failure.
+        let states = particles.parts.of_some(connectivity.processes(), some(), state);
+        for (p, (h, internal)) in some().zip(&states) {
+            let at = MaterialState::new(*h).in_step(self.step.dt, internal);
             let law = &self.step.bodies[particles.body[p] as usize].law;
             let particle = particles.id[p] as usize;
             law.check_claim(&at).map_err(|sentence| CheckError::Claim { particle, sentence })?;

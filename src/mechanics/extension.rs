@@ -32,21 +32,25 @@ fn of_field<const D: usize>(
     let (grid, reference) = (connectivity.grid(), particles.reference());
     let in_field = |p: usize| connectivity.field_of(particles.body[p]) == field;
     let local = |p: usize, k: usize| grid.axis(k).local(reference.position[p][k]).unwrap_or(0.0);
+    // The domain is a box. At F = I the box is a cube of the particle's volume. Its edge along axis k grows with |row k of F|.
+    let domain = particles.parts.everywhere(connectivity.processes(), |p| {
+        let f = identity::<f64, D>() + reference.displacement_gradient(p);
+        let side = (particles.volume[p] / grid.spacing.powi(D as i32)).powf(1.0 / D as f64);
+        let edges = std::array::from_fn::<_, 3, _>(|k| if k < D { (side * f.row(k).norm()).min(LONGEST) } else { 0.0 });
+        [reference.volume(p), edges[0], edges[1], edges[2]]
+    });
     // The cells of the particles, and the volumes in all cells that their domains overlap.
     let add = |p: usize, own: &mut Vec<[u32; D]>, volumes: &mut FxHashMap<[u32; D], f64>| {
         let cell = std::array::from_fn(|k| pieces.cell(local(p, k), grid.cells[k]));
         if own.last() != Some(&cell) {
             own.push(cell);
         }
-        // The domain is a box. At F = I the box is a cube of the particle's volume. Its edge along axis k grows with |row k of F|.
-        let f = identity::<f64, D>() + reference.displacement_gradient[p];
-        let side = (particles.volume[p] / grid.spacing.powi(D as i32)).powf(1.0 / D as f64);
-        let length = |k: usize| (side * f.row(k).norm()).min(LONGEST);
-        let along: [_; D] = std::array::from_fn(|k| pieces.overlaps(local(p, k), length(k), grid.cells[k]));
+        let [whole, edges @ ..] = domain(p);
+        let along: [_; D] = std::array::from_fn(|k| pieces.overlaps(local(p, k), edges[k], grid.cells[k]));
         for which in indices::<D>(std::array::from_fn(|k| along[k].len() as u64)) {
             let parts: [(u32, f64); D] = std::array::from_fn(|k| along[k][which[k] as usize]);
             let volume = volumes.entry(parts.map(|(cell, _)| cell)).or_insert(0.0);
-            *volume += reference.volume(p) * parts.iter().map(|(_, part)| part).product::<f64>();
+            *volume += whole * parts.iter().map(|(_, part)| part).product::<f64>();
         }
     };
     let parts = parallel::collect(parallel::parts(particles.len()), &|part| {

@@ -66,12 +66,12 @@ pub(crate) struct Kinematics<'a, const D: usize>(pub &'a Particles<D>);
 impl<'a, const D: usize> Kinematics<'a, D> {
     /// H of particle p at L = `l`.
     pub(crate) fn displacement_gradient<T: Real>(self, p: usize, l: &Tensor<T, D>) -> Tensor<T, D> {
-        compose(l, &self.0.reference().displacement_gradient[p])
+        compose(l, self.0.reference().displacement_gradient(p))
     }
 
     /// F_r of particle p.
     pub(crate) fn reference(self, p: usize) -> Tensor<f64, D> {
-        identity::<f64, D>() + self.0.reference().displacement_gradient[p]
+        identity::<f64, D>() + self.0.reference().displacement_gradient(p)
     }
 
     /// The state of particle p for its law at L = `l`, with the internal variables at t_n.

@@ -89,9 +89,11 @@ impl<const D: usize> Tangent<'_, D> {
         });
         let groups = GroupsOfCells { lanes: lanes_of_groups, of_cells: cells_of_groups.transposed(form.cells.len()) };
         form.make_room(D.pow(4));
+        let reference = particles.reference();
+        let volume = particles.parts.everywhere(connectivity.processes(), |p| reference.volume(p));
         let of_group = |cell: usize, (group, lanes): (usize, &Lanes)| {
             let in_group = lanes_in(lanes, cell).map(|lane| particles_of_groups[group][lane] as usize);
-            in_group.fold(Vector::<f64, 4>::zeros(), |sum, p| sum + self.share_of_cell(p, cells[p]))
+            in_group.fold(Vector::<f64, 4>::zeros(), |sum, p| sum + self.share_of_cell(p, volume(p), cells[p]))
         };
         let sums = parallel::values_by(CELLS, form.cells.len(), |cell| {
             groups.of_cell(cell).fold(Vector::<f64, 4>::zeros(), |sum, group| sum + of_group(cell, group))
@@ -140,12 +142,12 @@ impl<const D: usize> Tangent<'_, D> {
         self.connectivity().in_lattice(field, self.cell_in_grid(p))
     }
 
-    /// The volume of a particle over that of its cell `at` in the lattice, and this share times x.
-    fn share_of_cell(&self, p: usize, at: [u32; 3]) -> Vector<f64, 4> {
+    /// The `volume` of a particle over that of its cell `at` in the lattice, and this share times x.
+    fn share_of_cell(&self, p: usize, volume: f64, at: [u32; 3]) -> Vector<f64, 4> {
         let (grid, reference) = (self.connectivity().grid(), self.mass.particles.reference());
         let within = self.cell_in_grid(p);
         let mut share = Vector::zeros();
-        share[0] = reference.volume(p) / grid.spacing.powi(D as i32);
+        share[0] = volume / grid.spacing.powi(D as i32);
         for k in 0..D {
             let local = (reference.position[p][k] - grid.origin[k]) / grid.spacing;
             share[k + 1] = share[0] * (local + f64::from(at[k] - within[k]));

@@ -79,8 +79,8 @@ impl<const D: usize> Mass<'_, D> {
         }
     }
 
-    /// Solves M̃ w = Σ_p m u_p N_I for two particle fields `u`; at light nodes w = 0. Also returns the number of iterations, 0 for a lumped
-    /// mass.
+    /// Solves M̃ w = Σ_p m u_p N_I for two fields `u` of the particles of this process; at light nodes w = 0. Also returns the number of
+    /// iterations, 0 for a lumped mass.
     ///
     /// # Errors
     /// The sums overflow.
@@ -89,7 +89,7 @@ impl<const D: usize> Mass<'_, D> {
         let lumped = restricted(&space, self.lumped);
         let right = |field: &[Vector<f64, D>]| {
             let mut out: Pooled<Vector<f64, D>> = self.connectivity.field();
-            self.connectivity.spread(&mut out, |p| field[p] * self.particles.mass[p]);
+            self.connectivity.spread(&mut out, |p| field[self.particles.here(p)] * self.particles.mass[p]);
             space.followers().restrict(&mut out);
             out
         };

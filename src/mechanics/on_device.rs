@@ -83,7 +83,7 @@ impl<const D: usize, L: Law> Laws<'_, D, L> {
         let (transfer, formulas) = (connectivity.on_device()?, self.formulas()?);
         let (particles, reference) = (self.particles, self.particles.reference());
         let state = |p: usize, k: usize| {
-            let h_r = &reference.displacement_gradient[p];
+            let h_r = reference.displacement_gradient(p);
             if k < D * D { h_r[(k / D, k % D)] } else { particles.volume[p] }
         };
         let states = connectivity.states_on_device(transfer.gpu(), state, |p| particles.body[p]);

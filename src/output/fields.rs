@@ -43,8 +43,17 @@ impl Field {
         self.append_at(simulation, reference, place, out)
     }
 
-    /// Refuses an internal variable that no law has.
+    /// Whether the field needs more of a particle than every process has.
+    pub(super) fn needs_state(&self) -> bool {
+        !matches!(self, Self::Position | Self::Displacement | Self::Mass | Self::Volume | Self::Body)
+    }
+
+    /// Refuses an internal variable that no law has, and velocities and accelerations without inertia.
     pub(super) fn check<const D: usize, L: Law, A>(&self, simulation: &Simulation<D, L, A>) -> Result<(), OutputError> {
+        let rates = &simulation.particles.velocity;
+        if matches!(self, Self::Velocity | Self::Acceleration) && rates.is_empty() && !simulation.particles.is_empty() {
+            return Err(OutputError::Inertia(self.clone()));
+        }
         let Self::Internal(name) = self else { return Ok(()) };
         let known = internal_variable_names(simulation.bodies.iter().map(|body| &body.law));
         let found = known.contains(&name.as_str());
@@ -74,8 +83,9 @@ impl Field {
             Ok(stress)
         };
         let symmetric = |tensor: Tensor<f64, 3>| SYMMETRIC.map(|component| tensor[component]);
-        let rate =
-            |rates: &[Vector<f64, D>]| rates.get(place).map(padded).ok_or_else(|| OutputError::Inertia(self.clone()));
+        let rate = |rates: &[Vector<f64, D>]| {
+            rates.get(particles.here(place)).map(padded).ok_or_else(|| OutputError::Inertia(self.clone()))
+        };
         let recalled = |name| internal_variable(law, &at(), name).unwrap_or(0.0);
         match self {
             Self::Position => out.extend(padded(&particles.position[place])),

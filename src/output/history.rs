@@ -6,7 +6,8 @@ use super::fields::padded;
 use crate::approximation::ShapeFunction;
 use crate::material::{DISSIPATED, Law, PLASTIC_STRAIN};
 use crate::mechanics::loads::{Loads, Reaction, RigidBody};
-use crate::simulation::{ContactForces, Simulation};
+use crate::simulation::{ContactForces, Simulation, Sums};
+use crate::tensor::Vector;
 use nalgebra::Rotation3;
 
 /// Axis names at the ends of column names.
@@ -61,8 +62,16 @@ impl Energies {
         simulation: &Simulation<D, L, A>,
         reference: &Reference<D>,
     ) -> Self {
-        let (kinetic, strain) = (simulation.particles.kinetic_energy(), simulation.strain_energy());
-        let by_laws = simulation.dissipated_by_laws();
+        Self::with(simulation, reference, &simulation.sums_here())
+    }
+
+    /// The energies of the present state, whose sums over all particles are known.
+    pub(crate) fn with<const D: usize, L: Law, A: ShapeFunction>(
+        simulation: &Simulation<D, L, A>,
+        reference: &Reference<D>,
+        sums: &Sums<D>,
+    ) -> Self {
+        let Sums { kinetic, strain, by_laws, .. } = *sums;
         let dissipated = simulation.dissipated + by_laws;
         let friction = simulation.loads.contacts.friction_loss();
         let contact = simulation.contact_energy();
@@ -87,13 +96,18 @@ pub(crate) struct Cost {
 
 /// The row of the present state in `history.csv`. Columns without meaning in a run are left out. In load steps, loads act at once, and an
 /// energy balance says nothing of their work.
-pub(crate) fn row<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, energies: &Energies, cost: Cost) -> Row {
+pub(crate) fn row<const D: usize, L: Law, A>(
+    simulation: &Simulation<D, L, A>,
+    energies: &Energies,
+    momentum: &Vector<f64, D>,
+    cost: Cost,
+) -> Row {
     let Energies { kinetic, strain, external, contact, dissipated, friction, total, balance, .. } = *energies;
     let scheme = &simulation.settings.scheme;
     let contacts = &simulation.loads.contacts;
     let dissipates =
         simulation.loads.damping.is_some() || contacts.have_friction() || simulation.has_internal_variable(DISSIPATED);
-    let momentum = padded(&simulation.particles.momentum());
+    let momentum = padded(momentum);
     let columns = [
         (true, "step", cell(simulation.clock.steps())),
         (true, "time", cell(simulation.clock.time())),

@@ -15,10 +15,12 @@ use super::touched;
 use super::warnings::Watched;
 use super::{OutputError, Reference, Summary};
 use crate::approximation::ShapeFunction;
+use crate::clock::Clock;
 use crate::field::Field;
 use crate::material::Law;
 use crate::mechanics::loads::Reaction;
-use crate::simulation::{ContactForces, Simulation, StepReport};
+use crate::simulation::{ContactForces, Simulation, StepReport, Sums};
+use crate::tensor::Vector;
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -71,6 +73,8 @@ pub struct Recorder<const D: usize> {
     /// mark.
     so_far: Mark,
     since: Instant,
+    /// The sums over all particles after the last step that was recorded.
+    sums: Sums<D>,
     /// Whether a run may resume from a mark.
     marked: bool,
 }
@@ -128,7 +132,7 @@ impl<const D: usize> Recorder<D> {
         let untouched = vec![ContactForces::NONE; loads.contacts.obstacles.len()];
         // Only the names of the columns are needed here.
         let rows = [
-            ("history.csv", true, history::row(simulation, &Energies::default(), Cost::default())),
+            ("history.csv", true, history::row(simulation, &Energies::default(), &Vector::zeros(), Cost::default())),
             ("reactions.csv", !no_reactions.is_empty(), history::reactions(0.0, loads, &no_reactions)),
             ("obstacles.csv", !untouched.is_empty(), history::obstacles(0.0, loads, &untouched)),
             ("contacts.csv", loads.contacts.between.is_some(), history::pair(0.0, [""; 2], &ContactForces::<D>::NONE)),
@@ -150,6 +154,7 @@ impl<const D: usize> Recorder<D> {
             progress: Progress::new(simulation.clock.time(), end_time, audience),
             so_far,
             since: Instant::now(),
+            sums: simulation.sums_here(),
             marked: mark.is_some(),
             reference,
             directory,
@@ -187,6 +192,27 @@ impl<const D: usize> Recorder<D> {
         simulation: &Simulation<D, L, A>,
         step: &StepReport<D>,
     ) -> Result<(), OutputError> {
+        self.record_with(simulation, step, &simulation.sums_here())
+    }
+
+    /// Whether [`Self::record_with`] needs the state of all particles in this process.
+    pub(crate) fn needs_particles(&self, clock: &Clock) -> bool {
+        let is_due = |snapshots: &Snapshots<D>| snapshots.need_particles() && snapshots.is_next(clock);
+        !self.probes.is_empty() || self.snapshots.as_ref().is_some_and(is_due)
+    }
+
+    /// Whether [`Self::finish`] needs the state of all particles in this process.
+    pub(crate) fn needs_particles_at_end(&self) -> bool {
+        self.snapshots.as_ref().is_some_and(Snapshots::need_particles)
+    }
+
+    /// [`Self::record`] of a step whose sums over all particles are known.
+    pub(crate) fn record_with<L: Law, A: ShapeFunction>(
+        &mut self,
+        simulation: &Simulation<D, L, A>,
+        step: &StepReport<D>,
+        sums: &Sums<D>,
+    ) -> Result<(), OutputError> {
         let started = Instant::now();
         let (time, number) = (simulation.clock.time(), simulation.clock.steps());
         let settings = &simulation.settings;
@@ -205,6 +231,7 @@ impl<const D: usize> Recorder<D> {
         let newton = &step.newton.history;
         let (iterations, krylov) = (newton.iterations.len(), newton.counts.krylov_iterations);
         let cost = Cost { dt: step.dt, newton: iterations, krylov, yielding: step.yielding };
+        self.sums = *sums;
         let energies = self.write_state(simulation, cost)?;
         let attempts = || step.failed.iter().map(|attempt| &attempt.newton).chain([newton]);
         let seen = Watched {
@@ -282,14 +309,14 @@ impl<const D: usize> Recorder<D> {
         let has_inertia = simulation.settings.scheme.has_inertia();
         self.so_far.watch.end(time, self.so_far.counts.steps, has_inertia);
         self.so_far.watch.warnings[known..].iter().for_each(|warning| self.progress.warn(warning));
-        let particles = &simulation.particles;
+        let sums = if simulation.particles.are_all_here() { simulation.sums_here() } else { self.sums };
         let summary = Summary {
             time,
-            mass: particles.mass.iter().sum(),
+            mass: simulation.particles.mass.iter().sum(),
             has_inertia,
-            energies: Energies::of(simulation, &self.reference),
-            momentum_change: (particles.momentum() - self.reference.momentum).norm(),
-            momentum_scale: particles.mass.iter().zip(&particles.velocity).fold(0.0, |sum, (m, v)| sum + m * v.norm()),
+            energies: Energies::with(simulation, &self.reference, &sums),
+            momentum_change: (sums.momentum - self.reference.momentum).norm(),
+            momentum_scale: sums.momentum_scale,
             krylov: simulation.krylov().0,
             seconds: self.seconds_so_far(),
             contact: self.so_far.watch.contacts,
@@ -312,8 +339,8 @@ impl<const D: usize> Recorder<D> {
         simulation: &Simulation<D, L, A>,
         cost: Cost,
     ) -> Result<Energies, OutputError> {
-        let energies = Energies::of(simulation, &self.reference);
-        self.write("history.csv", &history::row(simulation, &energies, cost))?;
+        let energies = Energies::with(simulation, &self.reference, &self.sums);
+        self.write("history.csv", &history::row(simulation, &energies, &self.sums.momentum, cost))?;
         self.write("probes.csv", &probes::row(&self.probes, simulation, &self.reference)?)?;
         if let Some(snapshots) = &mut self.snapshots
             && snapshots.is_due(&simulation.clock)

@@ -5,6 +5,7 @@ use super::fields::padded;
 use super::moved_outlines::MovedOutlines;
 use super::outlines::Outlines;
 use super::pvd::{self, SERIES};
+use super::rows::Rows;
 use super::vtu::{Background, Column, Snapshot};
 use super::{OutputError, Reference, surfaces};
 use crate::clock::Clock;
@@ -91,7 +92,6 @@ impl<const D: usize> Snapshots<D> {
         if !(every > 0.0 && every.is_finite()) {
             return Err(OutputError::SnapshotEvery(every));
         }
-        let unique = fields.iter().enumerate().filter(|&(k, field)| !fields[..k].contains(field));
         let mut entries = [const { String::new() }; SERIES.len()];
         let (contacts, grid) = (&simulation.loads.contacts, &simulation.grid);
         let outlines = (!contacts.obstacles.is_empty()).then(|| Outlines::of(contacts, grid));
@@ -102,18 +102,26 @@ impl<const D: usize> Snapshots<D> {
             entries[k] = pvd::first_entries(&path, mark.written)?;
             pvd::write(&path, &entries[k])?;
         }
-        let fields = unique.map(|(_, field)| field.clone()).collect();
-        Ok(Self { fields, directory, outlines, bodies, entries, every, mark })
+        Ok(Self { fields: unique(fields), directory, outlines, bodies, entries, every, mark })
     }
 
     /// Whether the time has reached a multiple of `every` since the last call that was due, or there was no such call.
     pub(crate) fn is_due(&mut self, clock: &Clock) -> bool {
-        let passed = multiples(clock, self.every);
-        let is_due = self.mark.passed.is_none_or(|before| passed > before);
+        let is_due = self.is_next(clock);
         if is_due {
-            self.mark.passed = Some(passed);
+            self.mark.passed = Some(multiples(clock, self.every));
         }
         is_due
+    }
+
+    /// Whether one process needs the state of all particles to write a snapshot.
+    pub(crate) fn need_particles(&self) -> bool {
+        self.bodies.is_some()
+    }
+
+    /// What the next call of [`Self::is_due`] says.
+    pub(crate) fn is_next(&self, clock: &Clock) -> bool {
+        self.mark.passed.is_none_or(|before| multiples(clock, self.every) > before)
     }
 
     /// Writes the present state, unless it is already written.
@@ -165,6 +173,12 @@ pub(crate) fn multiples(clock: &Clock, every: f64) -> f64 {
     ((clock.time() + 1e-6 * clock.nominal()) / every).floor()
 }
 
+/// The fields without repetitions.
+pub(crate) fn unique(fields: &[Field]) -> Vec<Field> {
+    let first = fields.iter().enumerate().filter(|&(k, field)| !fields[..k].contains(field));
+    first.map(|(_, field)| field.clone()).collect()
+}
+
 /// The time and the grid of a snapshot.
 fn head<const D: usize, L, A>(simulation: &Simulation<D, L, A>) -> Snapshot {
     let grid = &simulation.grid;
@@ -190,19 +204,18 @@ fn write_particles<const D: usize, L: Law, A: Sync>(
     reference: &Reference<D>,
     fields: &[Field],
 ) -> Result<(), OutputError> {
-    let places = &simulation.particles.solid_places();
+    let all = &Rows::new(simulation, reference, fields);
+    let count = all.places.len();
     let names = |field: &Field| field.kind().components().iter().map(|&name| name.to_owned()).collect();
     let components: Vec<Vec<String>> = fields.iter().map(names).collect();
     let mut columns = Vec::new();
-    for (field, components) in fields.iter().zip(&components) {
+    for (number, (field, components)) in fields.iter().zip(&components).enumerate() {
         field.check(simulation)?;
         let about = (field.name(), components.as_slice(), field.kind() == Kind::Index);
-        columns.push(Column::new(about, places.len(), |rows, out| {
-            field.append_at_all(simulation, reference, &places[rows], out)
-        }));
+        columns.push(Column::new(about, count, move |rows, out| all.append(number, rows, out)));
     }
-    head.write_columns(path, columns, places.len(), |rows, out| {
-        out.extend(places[rows].iter().flat_map(|&p| padded(&simulation.particles.position[p as usize])));
+    head.write_columns(path, columns, count, |rows, out| {
+        out.extend(all.places[rows].iter().flat_map(|&p| padded(&simulation.particles.position[p as usize])));
         Ok(())
     })
 }

@@ -101,7 +101,7 @@ pub struct Snapshot {
 }
 
 /// `(rows, out)`: appends the bytes of some rows of a column.
-type Fill<'a> = dyn Fn(Range<usize>, &mut Vec<u8>) -> Result<(), OutputError> + Sync + 'a;
+type Fill<'a> = dyn Fn(Range<usize>, &mut Vec<u8>) -> Result<(), OutputError> + 'a;
 
 /// A column of a file: an array whose bytes are computed when they are written.
 pub(super) struct Column<'a> {
@@ -119,7 +119,7 @@ impl<'a> Column<'a> {
     pub(super) fn new(
         (name, components, is_index): (&'a str, &'a [String], bool),
         rows: usize,
-        fill: impl Fn(Range<usize>, &mut Vec<f64>) -> Result<(), OutputError> + Sync + 'a,
+        fill: impl Fn(Range<usize>, &mut Vec<f64>) -> Result<(), OutputError> + 'a,
     ) -> Self {
         let (vtk_type, size) = if is_index { ("UInt32", size_of::<u32>()) } else { ("Float64", size_of::<f64>()) };
         let fill = move |rows: Range<usize>, out: &mut Vec<u8>| {
@@ -135,7 +135,7 @@ impl<'a> Column<'a> {
     fn of_cells(
         (vtk_type, name, width): (&'static str, &'a str, usize),
         rows: usize,
-        fill: impl Fn(Range<usize>, &mut Vec<u8>) + Sync + 'a,
+        fill: impl Fn(Range<usize>, &mut Vec<u8>) + 'a,
     ) -> Self {
         let fill = move |rows: Range<usize>, out: &mut Vec<u8>| {
             fill(rows, out);
@@ -170,14 +170,11 @@ impl<'a> Column<'a> {
         let start = file.stream_position()?;
         file.write_all(&table(vec![0; blocks]))?;
         let mut sizes = Vec::new();
-        for first in (0..blocks).step_by(AT_ONCE) {
-            let block = |number: usize| {
-                let mut block = Vec::with_capacity(BLOCK);
-                let filled = (self.fill)(number * rows..self.rows.min((number + 1) * rows), &mut block);
-                filled.map(|()| compressed(&block, Compression::fast()))
-            };
-            for block in parallel::collect(first..blocks.min(first + AT_ONCE), &block) {
-                let block = block.map_err(Error::other)?;
+        for first in (0..self.rows).step_by(rows * AT_ONCE) {
+            let mut bytes = Vec::new();
+            (self.fill)(first..self.rows.min(first + rows * AT_ONCE), &mut bytes).map_err(Error::other)?;
+            let blocks = bytes.chunks(rows * self.width);
+            for block in parallel::collect(blocks, &|block| compressed(block, Compression::fast())) {
                 sizes.push(block.len());
                 file.write_all(&block)?;
             }
@@ -245,7 +242,7 @@ impl Snapshot {
         path: &Path,
         arrays: Vec<Column<'_>>,
         count: usize,
-        points: impl Fn(Range<usize>, &mut Vec<f64>) -> Result<(), OutputError> + Sync,
+        points: impl Fn(Range<usize>, &mut Vec<f64>) -> Result<(), OutputError>,
     ) -> Result<(), OutputError> {
         let corners = self.corners.clamp(1, TYPES.len());
         let (cells, axes) = (count / corners, AXES.map(str::to_owned));

@@ -6,9 +6,11 @@
 
 mod as_threads;
 mod mpi;
+mod parts;
 mod processes;
 
 pub use mpi::MpiError;
+pub(crate) use parts::{Change, Parts};
 pub use processes::{Exchange, Message, Processes};
 
 use bytemuck::Pod;

@@ -16,6 +16,9 @@ const PATH: &str = "BFREE_MPI";
 /// One call hands over this many bytes at most, because MPI counts with 32 bits.
 const MOST: usize = 1 << 30;
 
+/// One call collects this many bytes at most, for which process 0 has a buffer.
+const AT_ONCE: usize = 1 << 22;
+
 /// Exit code of a program that panics.
 const PANICKED: c_int = 101;
 
@@ -70,6 +73,7 @@ pub enum MpiError {
 struct Mpi<H: Copy> {
     all_gather: AllGather<H>,
     broadcast: Broadcast<H>,
+    gather: Gather<H>,
     finalize: Finalize,
     abort: Abort<H>,
     world: H,
@@ -87,6 +91,8 @@ type Number<H> = unsafe extern "C" fn(H, *mut c_int) -> c_int;
 type AllGather<H> =
     unsafe extern "C" fn(*const c_void, c_int, H, *mut c_void, *const c_int, *const c_int, H, H) -> c_int;
 type Broadcast<H> = unsafe extern "C" fn(*mut c_void, c_int, H, c_int, H) -> c_int;
+type Gather<H> =
+    unsafe extern "C" fn(*const c_void, c_int, H, *mut c_void, *const c_int, *const c_int, H, c_int, H) -> c_int;
 type Abort<H> = unsafe extern "C" fn(H, c_int) -> c_int;
 type Finalize = unsafe extern "C" fn() -> c_int;
 
@@ -141,6 +147,7 @@ impl<H: Copy + Send + Sync + 'static> Mpi<H> {
         let this = Self {
             all_gather: *symbol(&library, "MPI_Allgatherv")?,
             broadcast: *symbol(&library, "MPI_Bcast")?,
+            gather: *symbol(&library, "MPI_Gatherv")?,
             finalize: *symbol(&library, "MPI_Finalize")?,
             abort: *symbol(&library, "MPI_Abort")?,
             world,
@@ -204,6 +211,27 @@ impl<H: Copy + Send + Sync> Exchange for Mpi<H> {
                 unsafe {
                     (self.broadcast)(piece.as_mut_ptr().cast(), piece.len() as c_int, byte, rank as c_int, world)
                 };
+            }
+        }
+    }
+
+    fn collect(&self, lengths: &[usize], own: &[u8], all: &mut [u8]) {
+        let (byte, world, most) = (self.byte, self.world, AT_ONCE.div_ceil(self.count));
+        let longest = lengths.iter().copied().max().unwrap_or(0);
+        for first in (0..longest).step_by(most) {
+            let piece = |length: usize| first.min(length)..(first + most).min(length);
+            let counts: Vec<c_int> = lengths.iter().map(|length| piece(*length).len() as c_int).collect();
+            let starts: Vec<c_int> = (0..counts.len()).map(|rank| counts[..rank].iter().sum()).collect();
+            let mut pieces =
+                if self.rank == 0 { vec![0_u8; counts.iter().sum::<c_int>() as usize] } else { Vec::new() };
+            let (from, to) = (&own[piece(own.len())], pieces.as_mut_ptr().cast());
+            let (address, count) = (from.as_ptr().cast(), from.len() as c_int);
+            // Safety: the piece is valid memory, and the pieces of all processes lie in the buffer of process 0.
+            unsafe { (self.gather)(address, count, byte, to, counts.as_ptr(), starts.as_ptr(), byte, 0, world) };
+            let (mut pieces, mut left) = (&pieces[..], &mut *all);
+            for &length in lengths.iter().filter(|_| self.rank == 0) {
+                let (piece, part) = (piece(length), left.split_off_mut(..length).unwrap_or_default());
+                part[piece.clone()].copy_from_slice(pieces.split_off(..piece.len()).unwrap_or_default());
             }
         }
     }

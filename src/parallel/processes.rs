@@ -21,6 +21,17 @@ pub trait Exchange: Debug + Send + Sync {
     /// Each process has written its part of `all`. The parts lie one after the other in the order of the processes, and `lengths` has their
     /// bytes. Fills in the parts of all other processes.
     fn exchange(&self, lengths: &[usize], all: &mut [u8]);
+
+    /// Joins the parts of all processes in `all` of process 0; the others receive nothing, and their `all` is empty. `lengths` has the bytes of
+    /// the parts.
+    fn collect(&self, lengths: &[usize], own: &[u8], all: &mut [u8]) {
+        let (mut joined, before) = (vec![0; lengths.iter().sum()], lengths[..self.rank()].iter().sum::<usize>());
+        joined[before..before + own.len()].copy_from_slice(own);
+        self.exchange(lengths, &mut joined);
+        if self.rank() == 0 {
+            all.copy_from_slice(&joined);
+        }
+    }
 }
 
 /// The processes of a run. By default there is one.
@@ -70,6 +81,15 @@ impl Processes {
             let lengths: Vec<usize> = lengths.iter().map(|length| length * size_of::<T>()).collect();
             exchange.exchange(&lengths, bytemuck::cast_slice_mut(all));
         }
+    }
+
+    /// The parts of all processes, whose lengths are known, joined in their order in process 0. The others receive nothing.
+    pub(crate) fn collected<T: Pod>(&self, lengths: &[usize], own: &[T]) -> Option<Vec<T>> {
+        let Some(exchange) = &self.0 else { return Some(own.to_vec()) };
+        let mut all = if self.rank() == 0 { vec![T::zeroed(); lengths.iter().sum()] } else { Vec::new() };
+        let lengths: Vec<usize> = lengths.iter().map(|length| length * size_of::<T>()).collect();
+        exchange.collect(&lengths, bytemuck::cast_slice(own), bytemuck::cast_slice_mut(&mut all));
+        (self.rank() == 0).then_some(all)
     }
 
     /// The lists of all processes, joined in their order, and their lengths.

@@ -33,14 +33,16 @@ pub(super) fn arrays<const D: usize, L: Law, A: ShapeFunction>(
     connectivity: &Connectivity<D>,
     cells: usize,
 ) -> Vec<ArrayUse> {
-    let whole = [
-        simulation.particle_arrays(connectivity),
-        simulation.nodal_arrays(connectivity.nodes()),
-        simulation.solver_arrays(connectivity, cells),
+    let (is_tiled, whole) = (connectivity.is_tiled(), simulation.needs_all_particles());
+    let groups = [
+        (simulation.pass_arrays(connectivity), is_tiled),
+        (simulation.own_arrays(), is_tiled && !whole),
+        (simulation.particle_arrays(connectivity), false),
+        (simulation.nodal_arrays(connectivity.nodes()), false),
+        (simulation.solver_arrays(connectivity, cells), false),
     ];
-    let shared = simulation.pass_arrays(connectivity).into_iter().map(|row| (row, connectivity.is_tiled()));
-    let whole = whole.concat().into_iter().map(|row| (row, false));
-    let used = shared.chain(whole).filter(|((used, ..), _)| *used);
+    let rows = groups.into_iter().flat_map(|(rows, is_shared)| rows.into_iter().map(move |row| (row, is_shared)));
+    let used = rows.filter(|((used, ..), _)| *used);
     used.map(|((_, name, bytes), is_shared)| ArrayUse { name, bytes: bytes as u64, is_shared }).collect()
 }
 
@@ -78,16 +80,25 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         ]
     }
 
+    /// The arrays that a process may have of its own particles alone.
+    fn own_arrays(&self) -> Vec<Row> {
+        let (count, variable_count) = (self.particles.len(), self.particles.variable_count);
+        vec![
+            (true, "particles: H", count * Self::TENSOR),
+            (self.has_inertia(), "particles: v, a", count * 2 * Self::VECTOR),
+            (self.keeps_grid(), "particles: H at the last grid reset", count * Self::TENSOR),
+            (variable_count > 0, "particles: memory of laws", count * variable_count * NUMBER),
+        ]
+    }
+
     fn particle_arrays(&self, connectivity: &Connectivity<D>) -> Vec<Row> {
         let (settings, count, nodes) = (&self.settings, self.particles.len(), connectivity.nodes());
-        let variable_count = self.particles.variable_count;
         let smooths = self.has_inertia() && settings.smoothing.is_some();
         let fits = self.has_inertia() && settings.projection == Projection::Affine;
         let fit_bytes = count * Self::TENSOR + nodes * (4 * Self::TENSOR + 4 * Self::VECTOR);
         vec![
-            (true, "particles: x, H, volume, mass, body, id", count * Particles::<D>::BYTES),
-            (self.has_inertia(), "particles: v, a", count * 2 * Self::VECTOR),
-            (variable_count > 0, "particles: memory of laws", count * variable_count * NUMBER),
+            (true, "particles: x, volume, mass, body, id", count * (Particles::<D>::BYTES - Self::TENSOR)),
+            (self.keeps_grid(), "particles: x at the last grid reset", count * Self::VECTOR),
             // The part of the field that nodes cannot represent, its change, and the change of the other field.
             (smooths, "particles: smoothing", count * 3 * Self::VECTOR),
             (fits, "affine fits of v, a", fit_bytes),
@@ -115,7 +126,6 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             (weighs, "nodal mass", nodes * 2 * NUMBER),
             // v and a, as projected and with prescribed values in place.
             (self.has_inertia(), "nodal fields: v, a", nodes * 4 * Self::VECTOR),
-            (self.keeps_grid(), "particles: x, H at the last grid reset", particles * (Self::VECTOR + Self::TENSOR)),
             (self.keeps_grid(), "nodal fields: motion since the grid reset, its rate", motion),
             // The positions of the last load step.
             (asks, "particles: x for a field of forces", particles * Self::VECTOR),

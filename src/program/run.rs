@@ -11,7 +11,7 @@ use super::steps::{Records, Schedule, Steps};
 use crate::checkpoint::{self, Checkpoints, Identity, Restored};
 use crate::memory;
 use crate::output::plot::{Look, plot_run};
-use crate::output::{Audience, Outcome, OutputSettings, Recorder, Reference, Summary};
+use crate::output::{Audience, Outcome, OutputSettings, Recorder, Reference, Summary, end_or_answer, unique};
 use crate::parallel::{self, Processes};
 use crate::plan::SurfaceUse;
 use crate::scene::{Scene, time::MAX_STEPS};
@@ -104,6 +104,7 @@ impl Run {
     /// Runs the scene, together with the other processes that a launcher of MPI has started.
     pub(crate) fn execute(&self) -> Result<(), Failure> {
         let start = Instant::now();
+        memory::give_arrays_back();
         let processes = Processes::launched().map_err(Failure::scene)?;
         self.processes.get_or_init(|| processes.count());
         agreed(&processes, check_likeness(&processes))?;
@@ -132,9 +133,10 @@ impl Run {
     }
 
     fn execute_in<const D: usize>(&self, scene: &Scene, start: Instant, processes: &Processes) -> Result<(), Failure> {
+        let simulation = self.scene.build_among::<D>(scene, processes)?;
         let prepared = match processes.rank() {
-            0 => self.prepared::<D>(scene, start),
-            _ => self.prepared_without_records::<D>(scene),
+            0 => self.prepared(simulation, scene, start),
+            _ => self.prepared_without_records(simulation, scene),
         };
         memory::give_back();
         let Prepared { mut steps, inputs, warnings, directory, _lock } = agreed(processes, prepared)?;
@@ -156,8 +158,11 @@ impl Run {
     }
 
     /// A run before its first step, in a process that writes no results.
-    fn prepared_without_records<const D: usize>(&self, scene: &Scene) -> Result<Prepared<D>, Failure> {
-        let mut simulation = self.scene.build::<D>(scene)?;
+    fn prepared_without_records<const D: usize>(
+        &self,
+        mut simulation: Simulation<D>,
+        scene: &Scene,
+    ) -> Result<Prepared<D>, Failure> {
         let directory = directory::of_results(self.out.as_deref(), &self.scene.scene)?;
         if self.restart {
             let settings = serde_json::to_value(scene).map_err(Failure::run)?;
@@ -167,13 +172,17 @@ impl Run {
         simulation.settings.check_tangent = self.check_tangent.and_then(NonZeroU64::new);
         let schedule = Schedule::new(&simulation.clock, scene.time.end, self.steps);
         let interrupted = stop_on_interrupt().map_err(Failure::run)?;
-        let steps = Steps { simulation, records: None, schedule, interrupted };
+        let steps = Steps { simulation, records: None, fields: unique(&scene.fields()), schedule, interrupted };
         Ok(Prepared { steps, inputs: Map::new(), warnings: Vec::new(), directory, _lock: None })
     }
 
     /// A run before its first step, with its files.
-    fn prepared<const D: usize>(&self, scene: &Scene, start: Instant) -> Result<Prepared<D>, Failure> {
-        let mut simulation = self.scene.build::<D>(scene)?;
+    fn prepared<const D: usize>(
+        &self,
+        mut simulation: Simulation<D>,
+        scene: &Scene,
+        start: Instant,
+    ) -> Result<Prepared<D>, Failure> {
         self.check_room(&mut simulation)?;
         simulation.settings.check_tangent = self.check_tangent.and_then(NonZeroU64::new);
         let directory = directory::of_results(self.out.as_deref(), &self.scene.scene)?;
@@ -219,7 +228,7 @@ impl Run {
             Checkpoints::new(directory.clone(), identity, self.options(&directory), every, restored.as_ref())
         });
         let records = Some(Records { recorder, checkpoints });
-        let steps = Steps { simulation, records, schedule, interrupted };
+        let steps = Steps { simulation, records, fields: unique(&scene.fields()), schedule, interrupted };
         Ok(Prepared { steps, inputs, warnings, directory, _lock: lock })
     }
 
@@ -283,9 +292,10 @@ impl Run {
                 self.say("stopped", text)
             }
         };
-        if let Some(Records { recorder, .. }) = steps.records {
-            let summary = recorder.finish(&steps.simulation, inputs, outcome).map_err(Failure::run)?;
-            self.show(&summary, warnings, directory)?;
+        let summary = steps.records.map(|records| records.recorder.finish(&steps.simulation, inputs, outcome));
+        end_or_answer(&steps.simulation, &steps.fields);
+        if let Some(summary) = summary {
+            self.show(&summary.map_err(Failure::run)?, warnings, directory)?;
         }
         let time = steps.simulation.clock.time();
         if let Some(error) = failure {

@@ -1,9 +1,11 @@
 //! The scene argument of a command, and `bfree check`.
 
+use super::agreement::agreed;
 use super::failure::{Failure, print, tell};
 use super::probes::{Bound, bound_probes};
 use crate::material::allow_library;
 use crate::memory;
+use crate::parallel::Processes;
 use crate::particles::Particles;
 use crate::plan::{DeviceUse, Plan, ProcessUse};
 use crate::scene::{self, Override, Scene, SceneError};
@@ -67,6 +69,21 @@ impl SceneArguments {
     pub(crate) fn build<const D: usize>(&self, scene: &Scene) -> Result<Simulation<D>, Failure> {
         let memory = memory::available().unwrap_or(u64::MAX);
         scene.build_within::<D>(self.folder(), memory).map_err(|error| self.unusable(error))
+    }
+
+    /// [`Self::build`], together with other processes, which share the evaluation of the acceleration at t = 0.
+    pub(crate) fn build_among<const D: usize>(
+        &self,
+        scene: &Scene,
+        processes: &Processes,
+    ) -> Result<Simulation<D>, Failure> {
+        let memory = memory::available().unwrap_or(u64::MAX);
+        let built = scene.build_unstarted::<D>(self.folder(), memory).map_err(|error| self.unusable(error));
+        let mut simulation = agreed(processes, built)?;
+        simulation.settings.processes = processes.clone();
+        agreed(processes, Scene::start(&mut simulation).map_err(|error| self.unusable(error)))?;
+        simulation.settings.processes = Processes::default();
+        Ok(simulation)
     }
 
     /// The plan of a run: its terms and arrays. Too little memory for the arrays is an error.

@@ -3,7 +3,8 @@
 use super::agreement::check_step;
 use crate::checkpoint::Checkpoints;
 use crate::clock::Clock;
-use crate::output::Recorder;
+use crate::field::Field;
+use crate::output::{Recorder, end_or_answer};
 use crate::parallel::in_pool;
 use crate::simulation::{AdvanceError, Simulation};
 use std::error::Error;
@@ -69,6 +70,16 @@ impl<const D: usize> Records<D> {
         }
     }
 
+    /// Whether the records of a step need the state of all particles in this process.
+    fn need_particles(&self, clock: &Clock) -> bool {
+        self.recorder.needs_particles(clock) || self.checkpoints.as_ref().is_some_and(|all| all.are_due(clock))
+    }
+
+    /// Whether the last records do.
+    fn need_particles_at_end(&self) -> bool {
+        self.recorder.needs_particles_at_end() || self.checkpoints.is_some()
+    }
+
     /// Writes the last checkpoint. It precedes the last snapshot and a shortened step. A longer run has neither of them here.
     fn write_last_checkpoint(&mut self, simulation: &Simulation<D>) -> Result<(), Box<dyn Error>> {
         match self.checkpoints.take() {
@@ -83,6 +94,8 @@ pub(super) struct Steps<const D: usize> {
     pub simulation: Simulation<D>,
     /// `None` in all processes but the first.
     pub records: Option<Records<D>>,
+    /// The fields of the snapshots.
+    pub fields: Vec<Field>,
     pub schedule: Schedule,
     /// Set by another thread to end the run after a whole step.
     pub interrupted: Arc<AtomicBool>,
@@ -103,6 +116,7 @@ impl<const D: usize> Steps<D> {
             }
             let interrupted = processes.any(self.interrupted.load(Ordering::Relaxed));
             if interrupted || self.schedule.whole_steps_are_taken(&self.simulation.clock) {
+                self.collect_particles_if(Records::need_particles_at_end);
                 let last = self.write(Records::write_last_checkpoint);
                 let failed = processes.any(last.is_err());
                 if failed || interrupted || !self.schedule.shorten(&mut self.simulation.clock) {
@@ -113,20 +127,34 @@ impl<const D: usize> Steps<D> {
             match in_pool(|| simulation.advance()) {
                 Ok(step) => {
                     check_step(&processes, &step)?;
-                    written = self.write(|records, at| Ok(records.recorder.record(at, &step)?));
+                    let (sums, clock) = (simulation.sums(), simulation.clock);
+                    self.collect_particles_if(|records| records.need_particles(&clock));
+                    written = self.write(|records, at| Ok(records.recorder.record_with(at, &step, &sums)?));
                 }
                 // The next round of the loop handles the interruption.
                 Err(error) if error.cause.is_stopped() => {}
-                Err(error) => return Ok(Some(error)),
+                Err(error) => {
+                    self.collect_particles_if(Records::need_particles_at_end);
+                    return Ok(Some(error));
+                }
             }
         }
     }
 
-    /// Calls `write`, if this process writes.
+    /// Collects the particles in process 0, if its records need them.
+    fn collect_particles_if(&mut self, need: impl FnOnce(&Records<D>) -> bool) {
+        if self.simulation.settings.processes.any(self.records.as_ref().is_some_and(need)) {
+            self.simulation.collect_particles();
+        }
+    }
+
+    /// Calls `write`, if this process writes. All others answer its questions.
     fn write(
         &mut self,
         write: impl FnOnce(&mut Records<D>, &Simulation<D>) -> Result<(), Box<dyn Error>>,
     ) -> Result<(), Box<dyn Error>> {
-        self.records.as_mut().map_or(Ok(()), |records| write(records, &self.simulation))
+        let written = self.records.as_mut().map_or(Ok(()), |records| write(records, &self.simulation));
+        end_or_answer(&self.simulation, &self.fields);
+        written
     }
 }

@@ -19,7 +19,7 @@ use crate::solver::{Forcing, NewtonSettings};
 use crate::tensor::Vector;
 use std::path::Path;
 
-type Build<const D: usize> = fn(&Scene, &Path, u64) -> Result<Simulation<D>, BuildError>;
+type Build<const D: usize> = fn(&Scene, &Path, u64, bool) -> Result<Simulation<D>, BuildError>;
 
 // Compiled once, in this crate, see `simulation/compiled.rs`.
 static BUILD_1: Build<1> = Scene::build_in_this_crate;
@@ -75,21 +75,44 @@ impl Scene {
     /// # Errors
     /// The errors of [`Self::build`], and particles that certainly need more memory, before room is made for them.
     pub fn build_within<const D: usize>(&self, folder: &Path, memory: u64) -> Result<Simulation<D>, BuildError> {
+        self.build_started(folder, memory, true)
+    }
+
+    /// [`Self::build_within`] without the acceleration at t = 0, which [`Self::start`] adds.
+    pub(crate) fn build_unstarted<const D: usize>(
+        &self,
+        folder: &Path,
+        memory: u64,
+    ) -> Result<Simulation<D>, BuildError> {
+        self.build_started(folder, memory, false)
+    }
+
+    fn build_started<const D: usize>(
+        &self,
+        folder: &Path,
+        memory: u64,
+        starts: bool,
+    ) -> Result<Simulation<D>, BuildError> {
         // Unit tests need one dimension or two.
         if const { cfg!(test) } {
-            return self.build_in_this_crate(folder, memory);
+            return self.build_in_this_crate(folder, memory, starts);
         }
         let built = match D {
-            1 => as_type(BUILD_1(self, folder, memory)),
-            2 => as_type(BUILD_2(self, folder, memory)),
-            3 => as_type(BUILD_3(self, folder, memory)),
+            1 => as_type(BUILD_1(self, folder, memory, starts)),
+            2 => as_type(BUILD_2(self, folder, memory, starts)),
+            3 => as_type(BUILD_3(self, folder, memory, starts)),
             _ => None,
         };
         built.unwrap_or_else(|| Err(other_dimension(D)))
     }
 
     /// [`Self::build_within`], compiled where it is called.
-    fn build_in_this_crate<const D: usize>(&self, folder: &Path, memory: u64) -> Result<Simulation<D>, BuildError> {
+    fn build_in_this_crate<const D: usize>(
+        &self,
+        folder: &Path,
+        memory: u64,
+        starts: bool,
+    ) -> Result<Simulation<D>, BuildError> {
         let grid: Grid<D> = self.grid.build().ok_or_else(|| other_dimension(D))?;
         self.shapes().iter().try_for_each(|(path, shape)| shape.read_files(path, folder, D))?;
         for (path, curve) in self.curves() {
@@ -123,10 +146,13 @@ impl Scene {
             ..Simulation::new(grid, approximation, bodies, particles, clock)
         };
         self.set_initial_velocity(&mut simulation)?;
-        simulation
-            .set_initial_acceleration()
-            .map_err(|source| BuildError::at("the acceleration at t = 0 cannot be computed", source))?;
-        Ok(simulation)
+        if starts { Self::start(&mut simulation).map(|()| simulation) } else { Ok(simulation) }
+    }
+
+    /// Sets the acceleration at t = 0.
+    pub(crate) fn start<const D: usize>(simulation: &mut Simulation<D>) -> Result<(), BuildError> {
+        let cannot = |source| BuildError::at("the acceleration at t = 0 cannot be computed", source);
+        simulation.set_initial_acceleration().map_err(cannot)
     }
 
     /// The shape functions; `None` if their parameters are not allowed, with the reasons in `problems`.

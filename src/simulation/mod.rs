@@ -14,6 +14,7 @@ mod report;
 mod settings;
 mod start;
 mod step;
+mod sums;
 mod touching;
 mod work;
 
@@ -23,19 +24,19 @@ pub use history::History;
 pub use next_step::NextStep;
 pub use report::{AdvanceError, BareParticle, ContactForces, FailedAttempt, StepError, StepReport};
 pub use settings::{InitialGuess, Settings};
+pub use sums::Sums;
 pub use touching::SharedNodes;
 
 use crate::approximation::{Approximation, ShapeFunction};
 use crate::clock::Clock;
 use crate::grid::Grid;
-use crate::material::{DISSIPATED, Law, Material, NonPositiveJacobian, first_piola, internal_variable};
+use crate::material::{Law, Material, NonPositiveJacobian, first_piola};
 use crate::mechanics::loads::{Loads, PrescribedDof};
 use crate::mechanics::path::Path;
 use crate::mechanics::schemes::Alphas;
 use crate::mechanics::sweep::{Connectivity, Fields, Points};
 use crate::mechanics::symmetry::Unsymmetric;
 use crate::mechanics::transfer::Nodal;
-use crate::parallel;
 use crate::particles::{Body, Particles};
 use crate::pooled::Pool;
 use crate::solver::Krylov;
@@ -169,10 +170,55 @@ impl<const D: usize, L, A> Simulation<D, L, A> {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn rearrange(&mut self, order: &[u32]) {
+        self.rearrange_among(Some(order), self.particles.parts.bounds().to_vec());
+    }
+
+    /// Fills in velocity, acceleration, deformation and internal variables of all particles in process 0, until its next step. Otherwise each of
+    /// several processes may have those of its own particles alone. All processes make this call before one of them reads these arrays.
+    ///
+    /// ```
+    /// use bfree::parallel::Processes;
+    ///
+    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &["grid.spacing=0.25".parse()?])?;
+    /// let start = scene.build::<2>("scenes".as_ref())?;
+    /// let numbers = std::thread::scope(|scope| {
+    ///     let run = |processes: Processes| {
+    ///         let mut simulation = start.clone();
+    ///         scope.spawn(move || {
+    ///             simulation.settings.processes = processes;
+    ///             simulation.step()?;
+    ///             let own = simulation.particles.velocity.len();
+    ///             simulation.collect_particles();
+    ///             Ok::<_, bfree::simulation::StepError>([own, simulation.particles.velocity.len()])
+    ///         })
+    ///     };
+    ///     let all: Vec<_> = Processes::as_threads(2).into_iter().map(run).collect();
+    ///     all.into_iter().map(|one| one.join().map_err(|_| "panicked")).collect::<Result<Result<Vec<_>, _>, _>>()
+    /// })??;
+    /// let (count, [[first, all], [second, still]]) = (start.particles.len(), [numbers[0], numbers[1]]);
+    /// assert!(first + second == count && all == count && still == second);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn collect_particles(&mut self) {
+        self.particles.collect(&self.settings.processes);
+    }
+
+    /// [`Self::rearrange`], after which each process has the particles between its two `bounds`. Without bounds, every process has all.
+    fn rearrange_among(&mut self, order: Option<&[u32]>, bounds: Vec<usize>) {
+        if let Some(order) = order {
+            self.rearrange_common(order, bounds.is_empty());
+        }
+        if !bounds.is_empty() {
+            self.particles.share_out(order, bounds, &self.settings.processes);
+        }
+    }
+
+    /// Rearranges what every process has of all particles; if the particles are `whole`, that is all.
+    fn rearrange_common(&mut self, order: &[u32], whole: bool) {
         self.workspace.connectivity = None;
         // Several processes need no array of all particles in a pass, so the pool shall not keep the memory of one.
         let pool = if self.settings.processes.are_several() { &Pool::default() } else { &self.workspace.pool };
-        self.particles.rearrange_in(order, pool);
+        self.particles.rearrange_in(order, pool, whole);
         let last = self.history.equilibrium.iter_mut().map(|last| &mut last.loads);
         let loads = std::iter::once(&mut self.loads).chain(last);
         let mut points = loads.flat_map(Loads::points_mut).peekable();
@@ -188,19 +234,6 @@ impl<const D: usize, L: Law, A> Simulation<D, L, A> {
     /// Whether a law has an internal variable of this name.
     pub(crate) fn has_internal_variable(&self, name: &str) -> bool {
         self.bodies.iter().any(|body| body.law.internal_variables().iter().any(|one| one.name == name))
-    }
-
-    /// Energy dissipated by plastic flow and relaxation since the start: Σ V₀ times the density that each law records.
-    pub fn dissipated_by_laws(&self) -> f64 {
-        if !self.has_internal_variable(DISSIPATED) {
-            return 0.0;
-        }
-        let (particles, bodies) = (&self.particles, &self.bodies);
-        let lost = |p: usize| {
-            let law = &bodies[particles.body[p] as usize].law;
-            particles.volume[p] * internal_variable(law, &particles.state(p, 0.0), DISSIPATED).unwrap_or(0.0)
-        };
-        parallel::sum(particles.len(), lost)
     }
 
     /// The Cauchy stress σ = P Fᵀ / J with P = F S (eq. 7), in the plane or along the line of the scene, of the particle at `place`.
@@ -289,35 +322,6 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             history: History { equilibrium: None, ..self.history },
             ..Simulation::new(self.grid, self.approximation, bodies, particles, self.clock)
         }
-    }
-
-    /// Σ V₀ W, the strain energy of all particles.
-    ///
-    /// ```
-    /// use bfree::tensor::Tensor;
-    ///
-    /// // A small uniaxial strain ε: ½ (Λ + 2G) ε² times the volume; Λ + 2G = 170 + 4/3 · 30 = 210.
-    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
-    /// let mut simulation = scene.build::<2>("scenes".as_ref())?;
-    /// assert_eq!(simulation.strain_energy(), 0.0);
-    /// let strain = 1e-8;
-    /// simulation.particles.displacement_gradient.fill(Tensor::<f64, 2>::new(strain, 0.0, 0.0, 0.0));
-    /// let linear = 0.5 * 210.0 * strain * strain * simulation.particles.volume.iter().sum::<f64>();
-    /// assert!((simulation.strain_energy() / linear - 1.0).abs() < 1e-7);
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    pub fn strain_energy(&self) -> f64 {
-        let particles = &self.particles;
-        let energy = |p: usize| {
-            if !particles.is_solid(p) {
-                return 0.0;
-            }
-            let at = particles.state(p, 0.0);
-            let body = &self.bodies[particles.body[p] as usize];
-            let [more, _] = body.averaged(particles.dilatation(p), at.j);
-            particles.volume[p] * (body.law.energy(&at) + more)
-        };
-        parallel::sum(particles.len(), energy)
     }
 
     /// Gives `velocity(x_I)` to the nodes and interpolates it once to the particles, v_p = Σ N v_I (section 4.1).

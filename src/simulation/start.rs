@@ -10,6 +10,7 @@ use crate::mechanics::schemes::Alphas;
 use crate::mechanics::sweep::{Connectivity, Fields, Points, ShapeFunctionError};
 use crate::mechanics::terms;
 use crate::mechanics::transfer::{Nodal, Projection};
+use crate::particles::Body;
 use crate::solver::LinearError;
 use crate::space::Nodes;
 
@@ -19,18 +20,30 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let resets = self.history.resets_grid();
         match self.workspace.connectivity.take() {
             Some(connectivity) if !resets && self.workspace.connectivity_is_valid => {
+                self.particles.keep_own(connectivity.processes());
                 Ok(connectivity.with_no_pass().with_gpu(self.settings.gpu.clone()))
             }
             spare => {
                 let mut connectivity = self.unaggregated(spare)?;
-                if let Some(order) = connectivity.block_order() {
-                    self.rearrange(&order);
+                let bounds = if self.needs_all_particles() { Vec::new() } else { connectivity.bounds() };
+                let order = connectivity.block_order();
+                self.rearrange_among(order.as_deref(), bounds);
+                if order.is_some() {
                     connectivity.rearrange();
                 }
                 // Sums over particles are made in the order of the blocks, as after a restart.
                 Ok(self.aggregated(connectivity))
             }
         }
+    }
+
+    /// Whether every process needs v, a, H and the internal variables of all particles: points of surfaces meet bodies of other processes, and
+    /// the means of cells, smoothing and affine fits are computed in every process.
+    pub(crate) fn needs_all_particles(&self) -> bool {
+        let Self { loads, bodies, settings, .. } = self;
+        let has_points = loads.surface.iter().any(|load| !load.points.is_empty()) || !loads.contacts.points.is_empty();
+        let averages = bodies.iter().any(Body::averages);
+        has_points || averages || settings.smoothing.is_some() || settings.projection == Projection::Affine
     }
 
     /// The shape functions in the reference configuration, in the memory of `spare`, which is no longer needed.

@@ -4,7 +4,7 @@ use super::Simulation;
 use crate::approximation::ShapeFunction;
 use crate::material::{Law, p_wave_modulus};
 use crate::mechanics::sweep::Connectivity;
-use crate::tensor::Vector;
+use crate::tensor::{Tensor, Vector};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 /// Particles with |N| below this value do not contribute to a node.
@@ -38,12 +38,23 @@ pub struct SharedNodes {
 /// The particles of each of two bodies that contribute to shared nodes.
 type Interface = [BTreeSet<usize>; 2];
 
+/// The present volume, and the stress if there is one, of particles at shared nodes.
+type States<const D: usize> = BTreeMap<usize, (f64, Option<Tensor<f64, D>>)>;
+
 impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// All pairs of bodies that share nodes.
     pub(crate) fn shared_nodes(&self, connectivity: &Connectivity<D>) -> Vec<SharedNodes> {
-        let interfaces = self.interfaces(connectivity).into_iter();
-        let of = |(bodies, sides)| SharedNodes { bodies, gap: self.gap(&sides), tension: self.tension(bodies, &sides) };
-        interfaces.map(of).collect()
+        let (interfaces, particles) = (self.interfaces(connectivity), &self.particles);
+        let places: BTreeSet<usize> = interfaces.values().flatten().flatten().copied().collect();
+        let state = |p| (particles.present_volume(p), self.cauchy_stress(p).ok());
+        let states = particles.parts.of_some(connectivity.processes(), places.iter().copied(), state);
+        let states = places.into_iter().zip(states).collect();
+        let of = |(bodies, sides)| SharedNodes {
+            bodies,
+            gap: self.gap(&sides, &states),
+            tension: self.tension(bodies, &sides, &states),
+        };
+        interfaces.into_iter().map(of).collect()
     }
 
     /// The particles that contribute to nodes of another body, by pairs of bodies.
@@ -54,8 +65,8 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         if fields.len() == self.bodies.len() {
             return found;
         }
-        let particles = &self.particles;
-        let solid = || (0..particles.len()).filter(|&p| particles.is_solid(p));
+        let (particles, processes) = (&self.particles, connectivity.processes());
+        let solid = || connectivity.own_particles().filter(|&p| particles.is_solid(p));
         let nodes = |p: usize| connectivity.of(p).filter(|(_, n, _)| n.abs() > NO_PART).map(|(node, ..)| node);
         // The lowest and the highest body at each node.
         let mut span = vec![[u32::MAX, 0]; connectivity.nodes()];
@@ -63,12 +74,21 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             let own = particles.body[p];
             nodes(p).for_each(|node| span[node] = [span[node][0].min(own), span[node][1].max(own)]);
         }
+        let reached = (0..).zip(&span).filter(|(_, [low, high])| low <= high);
+        let (reached, _) = processes.joined(reached.map(|(node, &[low, high])| [node, low, high]).collect());
+        for [node, low, high] in reached {
+            let [lowest, highest] = &mut span[node as usize];
+            (*lowest, *highest) = (low.min(*lowest), high.max(*highest));
+        }
         // The particles at nodes of several bodies, body by body.
-        let mut shared: BTreeMap<usize, BTreeMap<u32, Vec<usize>>> = BTreeMap::new();
-        for p in solid() {
-            for node in nodes(p).filter(|&node| span[node][0] < span[node][1]) {
-                shared.entry(node).or_default().entry(particles.body[p]).or_default().push(p);
-            }
+        let at_shared = |p: usize| {
+            let at_nodes = nodes(p).filter(|&node| span[node][0] < span[node][1]);
+            at_nodes.map(move |node| [node as u64, p as u64])
+        };
+        let (at_shared, _) = processes.joined(solid().flat_map(at_shared).collect());
+        let mut shared: BTreeMap<u64, BTreeMap<u32, Vec<usize>>> = BTreeMap::new();
+        for [node, p] in at_shared {
+            shared.entry(node).or_default().entry(particles.body[p as usize]).or_default().push(p as usize);
         }
         for bodies in shared.values() {
             for (&one, of_one) in bodies {
@@ -83,7 +103,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     }
 
     /// The smallest distance between particles of both sides, less half of their widths, in spacings.
-    fn gap(&self, [one, other]: &Interface) -> Option<f64> {
+    fn gap(&self, [one, other]: &Interface, states: &States<D>) -> Option<f64> {
         let (grid, particles) = (&self.grid, &self.particles);
         let mut cells: HashMap<u64, Vec<usize>> = HashMap::new();
         for &p in other {
@@ -91,7 +111,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
                 cells.entry(grid.id(cell)).or_default().push(p);
             }
         }
-        let width = |p: usize| particles.present_volume(p).powf(1.0 / D as f64);
+        let width = |p: usize| states[&p].0.powf(1.0 / D as f64);
         let mut least = f64::INFINITY;
         for reach in 0..=FARTHEST {
             for &p in one {
@@ -111,7 +131,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     }
 
     /// The mean of n·σ·n over the particles of both sides, if it is a tension. The normal n points from the first side to the second.
-    fn tension(&self, bodies: [u32; 2], sides: &Interface) -> Option<f64> {
+    fn tension(&self, bodies: [u32; 2], sides: &Interface, states: &States<D>) -> Option<f64> {
         let (particles, h) = (&self.particles, self.grid.spacing);
         let middle = |side: &BTreeSet<usize>| {
             let volume: f64 = side.iter().map(|&p| particles.volume[p]).sum();
@@ -121,7 +141,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let n = Some(across).filter(|across| across.norm() > ENCLOSED * h)?.normalize();
         let (mut volume, mut normal, mut squares) = (0.0, 0.0, 0.0);
         for &p in sides.iter().flatten() {
-            let stress = self.cauchy_stress(p).ok()?;
+            let stress = states[&p].1?;
             volume += particles.volume[p];
             normal += particles.volume[p] * n.dot(&(stress * n));
             squares += particles.volume[p] * stress.norm_squared();

@@ -60,7 +60,7 @@ impl<'a, T: Real> States<'a, T> {
         let reference = particles.reference();
         for (lane, &p) in group.iter().enumerate().take(LANES) {
             states.internal[lane] = particles.state(p as usize, dt).internal;
-            let h_r = &reference.displacement_gradient[p as usize];
+            let h_r = reference.displacement_gradient(p as usize);
             for i in 0..D {
                 for k in 0..D {
                     states.h_r[i * D + k][lane] = h_r[(i, k)];
@@ -75,7 +75,7 @@ impl<'a, T: Real> States<'a, T> {
     fn with_start<const D: usize>(mut self, particles: &Particles<D>, group: &[u32]) -> Self {
         let mut start = [[0.0; 9]; LANES];
         for (rows, &p) in start.iter_mut().zip(group) {
-            let h = &particles.displacement_gradient[p as usize];
+            let h = &particles.displacement_gradient[particles.here(p as usize)];
             rows[..D * D].copy_from_slice(h.transpose().as_slice());
         }
         self.start = Some(start);

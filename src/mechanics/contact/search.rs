@@ -318,7 +318,7 @@ fn places<const D: usize>(
             1 => f64::INFINITY,
             _ => 0.5 * (stretch * point.halved_area()).powf(1.0 / (D - 1) as f64),
         };
-        let back = (identity::<f64, D>() + particles.reference().displacement_gradient[p]) * inverse(&f);
+        let back = (identity::<f64, D>() + particles.reference().displacement_gradient(p)) * inverse(&f);
         Place { number, body: particles.body[p], ends: ends(number), normal: area / stretch, half, back }
     };
     parallel::values_by(POINTS, contacts.points.len(), place)

@@ -26,7 +26,7 @@ pub(crate) fn at_surface_points<'a, const D: usize>(
     let on_surface: BTreeMap<u32, Vector<f64, D>> = of_surface
         .filter(|point| !particles.is_solid(point.particle))
         .map(|point| {
-            let f = identity::<f64, D>() + reference.displacement_gradient[point.particle];
+            let f = identity::<f64, D>() + reference.displacement_gradient(point.particle);
             let normal = cofactor(&f) * point.normal;
             let outward = normal.try_normalize(0.0).unwrap_or(normal);
             (point.particle as u32, reference.position[point.particle] + outward * (SURFACE_DEPTH * grid.spacing))

@@ -330,6 +330,11 @@ impl<const D: usize> Connectivity<D> {
         self.tiled().map_or(0..self.particles(), Tiled::own_particles)
     }
 
+    /// The first particle of each process in the order of the passes; at the end, the number of particles. Empty with one process.
+    pub(crate) fn bounds(&self) -> Vec<usize> {
+        self.tiled().map_or_else(Vec::new, Tiled::bounds)
+    }
+
     /// The places of this process's particles in the order of the passes.
     pub(super) fn own_places(&self) -> Range<usize> {
         self.tiled().map_or(0..self.particles(), Tiled::own_places)

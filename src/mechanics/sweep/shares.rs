@@ -34,6 +34,11 @@ impl Shares {
         Self { processes: processes.clone(), bounds, interior, interface, distinct: Vec::new(), of_own: Vec::new() }
     }
 
+    /// The first block of each process; at the end, the number of blocks.
+    pub(super) fn bounds(&self) -> &[usize] {
+        &self.bounds
+    }
+
     /// The blocks of this process.
     pub(super) fn own(&self) -> Range<usize> {
         self.of(self.processes.rank())

@@ -132,9 +132,18 @@ impl<const D: usize> Tiled<D> {
 
     /// The places of this process's particles in [`Self::order`].
     pub(super) fn own_places(&self) -> Range<usize> {
-        let own = self.own();
-        own.first().map_or(0, |first| first.start as usize)
-            ..own.last().map_or(0, |last| last.start as usize + last.count())
+        let own = own(&self.shares, self.blocks.len());
+        self.start(own.start)..self.start(own.end)
+    }
+
+    /// The first particle of a block, or of no block behind the last one, in [`Self::order`].
+    fn start(&self, block: usize) -> usize {
+        self.blocks.get(block).map_or(self.particles(), |block| block.start as usize)
+    }
+
+    /// See [`super::Connectivity::bounds`].
+    pub(super) fn bounds(&self) -> Vec<usize> {
+        self.shares.iter().flat_map(|both| both.0.bounds().iter().map(|block| self.start(*block))).collect()
     }
 
     /// See [`super::Connectivity::own_particles`].

@@ -292,12 +292,13 @@ impl<'a, const D: usize> Update<'a, D> {
         dt: f64,
     ) -> Option<usize> {
         let variable_count = particles.variable_count;
+        // The internal variables of the particles that are here, see [`Particles::here`].
         let (mut next, undefined) = (parallel::copy_of(&particles.memory), First::none());
         if variable_count > 0 || !particles.dilatation.is_empty() {
             let (own, changes) = (connectivity.own_particles(), self.changes(connectivity));
             let update = |p: usize, next: &mut [f64]| {
                 let law = &bodies[particles.body[p] as usize].law;
-                let memory = &particles.memory[p * variable_count..(p + 1) * variable_count];
+                let memory = particles.state(p, dt).internal;
                 let h = Kinematics(particles).displacement_gradient(p, &changes.gradient(p - own.start));
                 let (at, det_f) = MaterialState::new(h).admissible_or_rest();
                 law.update_variables(&at.in_step(dt, memory), next);
@@ -307,7 +308,7 @@ impl<'a, const D: usize> Update<'a, D> {
                     undefined.keep(particles.id[p] as usize, ());
                 }
             };
-            let mut left = &mut next[own.start * variable_count..];
+            let mut left = &mut next[particles.here(own.start) * variable_count..];
             let part = |first: usize| {
                 let particles = first..own.end.min(first + PART);
                 Some((particles.clone(), left.split_off_mut(..particles.len() * variable_count)?))
@@ -318,7 +319,9 @@ impl<'a, const D: usize> Update<'a, D> {
                     next.split_off_mut(..variable_count).into_iter().for_each(|next| update(p, next));
                 }
             });
-            connectivity.share_particles(variable_count, &mut next);
+            if particles.are_whole() {
+                connectivity.share_particles(variable_count, &mut next);
+            }
         }
         self.memory = Some(next);
         undefined.anywhere(connectivity.processes()).map(|(particle, ())| particle)
@@ -337,20 +340,23 @@ impl<'a, const D: usize> Update<'a, D> {
             self.remember(particles, bodies, connectivity, dt);
         }
         let next = self.memory.take().unwrap_or_default();
-        let yielding = yielding(particles, bodies, &next);
+        let yielding = yielding(particles, bodies, connectivity, &next);
         particles.memory = next;
         let strain = self.move_particles(particles, connectivity);
         // Without inertia there are no increments.
         if !self.delta_velocity.is_empty() {
             let (own, changes) = (connectivity.own_particles(), self.changes(connectivity));
+            let (here, whole) = (particles.here(own.start)..particles.here(own.end), particles.are_whole());
             let fields = [&mut particles.velocity, &mut particles.acceleration];
             for (order, field) in fields.into_iter().enumerate() {
                 let smoothed = self.smoothed.as_ref().map(|smoothed| &smoothed[order][own.clone()]);
-                parallel::each(&mut field[own.clone()], |p, field| {
+                parallel::each(&mut field[here.clone()], |p, field| {
                     let delta = changes.increment(p, order);
                     *field += smoothed.map_or(delta, |smoothed| delta + smoothed[p]);
                 });
-                connectivity.share_particles(D, bytemuck::cast_slice_mut(field));
+                if whole {
+                    connectivity.share_particles(D, bytemuck::cast_slice_mut(field));
+                }
             }
         }
         Committed { strain, yielding }
@@ -359,16 +365,17 @@ impl<'a, const D: usize> Update<'a, D> {
     /// Writes x = x_r + Δx and F = (I + ∇_r φ) F_r. Returns the largest strain since the last grid reset.
     fn move_particles(&self, particles: &mut Particles<D>, connectivity: &Connectivity<D>) -> f64 {
         let (own, changes) = (connectivity.own_particles(), self.changes(connectivity));
+        let (here, whole) = (particles.here(own.start)..particles.here(own.end), particles.are_whole());
         let Particles { position, displacement_gradient, reference, .. } = particles;
-        let (first, reference) = (own.start, reference.as_ref());
-        let (x, h) = (&mut position[own.clone()], &mut displacement_gradient[own]);
+        let (first, reference) = ([own.start, here.start], reference.as_ref());
+        let (x, h) = (&mut position[own], &mut displacement_gradient[here]);
         let parts = x.chunks_mut(PART).zip(h.chunks_mut(PART)).enumerate();
         let strains = parallel::collect(parts, &|(part, (x, h)): (usize, Part<'_, D>)| {
             let own = part * PART..part * PART + x.len();
             if let Some(reference) = reference {
-                let of_all = first + own.start..first + own.end;
-                x.copy_from_slice(&reference.position[of_all.clone()]);
-                h.copy_from_slice(&reference.displacement_gradient[of_all]);
+                let [of_all, of_here] = first.map(|first| first + own.start..first + own.end);
+                x.copy_from_slice(&reference.position[of_all]);
+                h.copy_from_slice(&reference.displacement_gradient[of_here]);
             }
             let mut largest = 0.0_f64;
             for ((x, h), p) in x.iter_mut().zip(h).zip(own) {
@@ -380,7 +387,9 @@ impl<'a, const D: usize> Update<'a, D> {
             largest
         });
         connectivity.share_particles(D, bytemuck::cast_slice_mut(position));
-        connectivity.share_particles(D * D, bytemuck::cast_slice_mut(displacement_gradient));
+        if whole {
+            connectivity.share_particles(D * D, bytemuck::cast_slice_mut(displacement_gradient));
+        }
         let largest = connectivity.processes().told(&strains.into_iter().fold(0.0, f64::max));
         let largest = largest.into_iter().fold(0.0, f64::max);
         mutant!("transfer: no strain resets the grid": largest = 0.0);
@@ -392,19 +401,26 @@ impl<'a, const D: usize> Update<'a, D> {
 type Part<'a, const D: usize> = (&'a mut [Vector<f64, D>], &'a mut [Tensor<f64, D>]);
 
 /// The share of the volume of bodies with a plastic law in which the plastic strain grows to that of the memory `next`.
-fn yielding<const D: usize, L: Law>(particles: &Particles<D>, bodies: &[Body<L>], next: &[f64]) -> f64 {
+fn yielding<const D: usize, L: Law>(
+    particles: &Particles<D>,
+    bodies: &[Body<L>],
+    connectivity: &Connectivity<D>,
+    next: &[f64],
+) -> f64 {
     let place = |body: &Body<L>| body.law.internal_variables().iter().position(|one| one.name == PLASTIC_STRAIN);
     let plastic_strain: Vec<Option<usize>> = bodies.iter().map(place).collect();
     if plastic_strain.iter().all(Option::is_none) {
         return 0.0;
     }
+    let place = |p: usize| plastic_strain[particles.body[p] as usize];
+    let yields = particles.parts.everywhere(connectivity.processes(), |p| {
+        let variable = place(p).map(|place| particles.here(p) * particles.variable_count + place);
+        u8::from(variable.is_some_and(|variable| next[variable] > particles.memory[variable]))
+    });
     let (mut plastic, mut yielding) = (0.0, 0.0);
-    for (p, (&body, volume)) in particles.body.iter().zip(&particles.volume).enumerate() {
-        if let Some(&Some(place)) = plastic_strain.get(body as usize) {
-            plastic += volume;
-            let variable = p * particles.variable_count + place;
-            yielding += if next.get(variable) > particles.memory.get(variable) { *volume } else { 0.0 };
-        }
+    for (p, volume) in particles.volume.iter().enumerate().filter(|(p, _)| place(*p).is_some()) {
+        plastic += volume;
+        yielding += if yields(p) > 0 { *volume } else { 0.0 };
     }
     if plastic > 0.0 { yielding / plastic } else { 0.0 }
 }
