@@ -65,7 +65,7 @@ impl<L: Law> Body<L> {
 /// Particles lie in memory nearly in the order of the loop over cells, and a step may rearrange them. The `id` identifies a particle in
 /// results, probes and messages.
 ///
-/// In a run of several processes, the arrays v, a, H and `memory` hold the particles of this process alone, see
+/// After a step of several processes, the arrays v, a, H and `memory` may hold the particles of this process alone, until
 /// [`Simulation::collect_particles`](crate::simulation::Simulation::collect_particles).
 ///
 /// ```
@@ -416,6 +416,15 @@ impl<const D: usize> Particles<D> {
         if !self.are_whole() {
             let parts = self.parts.clone();
             self.change(parts.collected(processes));
+        }
+    }
+
+    /// Lets every process have all particles.
+    pub(crate) fn join(&mut self, processes: &Processes) {
+        self.keep_own(processes);
+        if !self.are_whole() {
+            let parts = self.parts.clone();
+            self.change(parts.joined(processes));
         }
     }
 

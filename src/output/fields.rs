@@ -50,8 +50,9 @@ impl Field {
 
     /// Refuses an internal variable that no law has, and velocities and accelerations without inertia.
     pub(super) fn check<const D: usize, L: Law, A>(&self, simulation: &Simulation<D, L, A>) -> Result<(), OutputError> {
-        let rates = &simulation.particles.velocity;
-        if matches!(self, Self::Velocity | Self::Acceleration) && rates.is_empty() && !simulation.particles.is_empty() {
+        // A process may have no particles of its own.
+        let moves = simulation.settings.scheme.has_inertia() || !simulation.particles.velocity.is_empty();
+        if matches!(self, Self::Velocity | Self::Acceleration) && !moves {
             return Err(OutputError::Inertia(self.clone()));
         }
         let Self::Internal(name) = self else { return Ok(()) };

@@ -29,19 +29,24 @@ impl<'a, const D: usize, L: Law, A: Sync> Rows<'a, D, L, A> {
     /// Appends the values of a field, given by its number, in some rows.
     pub(super) fn append(&self, number: usize, rows: Range<usize>, out: &mut Vec<f64>) -> Result<(), OutputError> {
         let (field, particles) = (&self.fields[number], &self.simulation.particles);
-        if particles.are_all_here() || !field.needs_state() {
-            let of_part = |places: &[u32]| {
-                let mut values = Vec::new();
-                field.append_at_all(self.simulation, self.reference, places, &mut values).map(|()| values)
-            };
-            for values in parallel::collect(self.places[rows].chunks(PART), &of_part) {
-                out.extend(values?);
-            }
-            return Ok(());
-        }
-        self.simulation.settings.processes.each([number, rows.start, rows.end].map(|number| number as u64));
-        out.extend(self.exchanged(field, rows)?);
+        let values = if particles.are_all_here() || !field.needs_state() {
+            self.evaluated(field, &self.places[rows])
+        } else {
+            self.simulation.settings.processes.each([number, rows.start, rows.end].map(|number| number as u64));
+            self.exchanged(field, rows)
+        };
+        out.extend(values?);
         Ok(())
+    }
+
+    /// The values of a field at places of this process.
+    fn evaluated(&self, field: &Field, places: &[u32]) -> Result<Vec<f64>, OutputError> {
+        let of_part = |places: &[u32]| {
+            let mut values = Vec::new();
+            field.append_at_all(self.simulation, self.reference, places, &mut values).map(|()| values)
+        };
+        let values: Result<Vec<_>, _> = parallel::collect(places.chunks(PART), &of_part).into_iter().collect();
+        values.map(|values| values.concat())
     }
 
     /// The values of a field in some rows, in process 0; nothing in the others.
@@ -52,14 +57,20 @@ impl<'a, const D: usize, L: Law, A: Sync> Rows<'a, D, L, A> {
         let (places, mut lengths) = (&self.places[rows], vec![0; processes.count()]);
         places.iter().for_each(|place| lengths[owner(place)] += width);
         let own: Vec<u32> = places.iter().copied().filter(|place| owner(place) == processes.rank()).collect();
-        let mut values = Vec::new();
-        let failed = match field.append_at_all(simulation, self.reference, &own, &mut values) {
-            Err(OutputError::Inadmissible { particle, source }) => Some((particle, source.det_f)),
-            result => result.map(|()| None)?,
+        let values = self.evaluated(field, &own);
+        let failed = values.as_ref().err().map(|error| match error {
+            OutputError::Inadmissible { particle, source } => (*particle, source.det_f),
+            _ => (usize::MAX, f64::NAN),
+        });
+        // Every process hears of a failure, and names the first particle.
+        let failed = processes.told(&failed).into_iter().flatten().min_by_key(|(particle, _)| *particle);
+        let values = match (values, failed) {
+            (Err(error), None | Some((usize::MAX, _))) => return Err(error),
+            (_, Some((particle, det_f))) => {
+                return Err(OutputError::Inadmissible { particle, source: NonPositiveJacobian { det_f } });
+            }
+            (Ok(values), None) => values,
         };
-        if let Some((particle, det_f)) = processes.told(&failed).into_iter().flatten().next() {
-            return Err(OutputError::Inadmissible { particle, source: NonPositiveJacobian { det_f } });
-        }
         let Some(all) = processes.collected(&lengths, &values) else { return Ok(Vec::new()) };
         let mut next: Vec<usize> = (0..lengths.len()).map(|process| lengths[..process].iter().sum()).collect();
         let row = |place: &u32| {

@@ -65,17 +65,23 @@ impl Change for Moved<'_> {
     }
 }
 
-/// All particles come to process 0.
-pub(crate) struct Collected<'a>(&'a Processes, &'a Parts);
+/// All particles come to process 0, or to everyone.
+pub(crate) struct Collected<'a> {
+    processes: &'a Processes,
+    parts: &'a Parts,
+    to_everyone: bool,
+}
 
 impl Change for Collected<'_> {
     fn apply<T: Pod + Send + Sync>(&self, array: &mut Vec<T>, width: usize) {
-        let Self(processes, parts) = self;
+        let Self { processes, parts, to_everyone } = self;
         if width == 0 || processes.each(array.len() as u64).iter().all(|len| *len == 0) {
             return;
         }
         let lengths: Vec<usize> = parts.counts().map(|count| count * width).collect();
-        if let Some(all) = processes.collected(&lengths, array) {
+        if *to_everyone {
+            *array = processes.joined(std::mem::take(array)).0;
+        } else if let Some(all) = processes.collected(&lengths, array) {
             *array = all;
         }
     }
@@ -153,7 +159,12 @@ impl Parts {
     /// The change by which process 0 gets all particles, from those that every process has after [`Self::kept`]; and the parts then.
     pub(crate) fn collected<'a>(&'a self, processes: &'a Processes) -> (Collected<'a>, Self) {
         let first = if processes.rank() == 0 { 0 } else { self.first };
-        (Collected(processes, self), Self { first, ..self.clone() })
+        (Collected { processes, parts: self, to_everyone: false }, Self { first, ..self.clone() })
+    }
+
+    /// The change by which every process gets all particles; and the parts then.
+    pub(crate) fn joined<'a>(&'a self, processes: &'a Processes) -> (Collected<'a>, Self) {
+        (Collected { processes, parts: self, to_everyone: true }, Self::default())
     }
 
     /// The change by which a process forgets the particles of others, and the parts then.

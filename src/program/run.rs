@@ -104,8 +104,10 @@ impl Run {
     /// Runs the scene, together with the other processes that a launcher of MPI has started.
     pub(crate) fn execute(&self) -> Result<(), Failure> {
         let start = Instant::now();
-        memory::give_arrays_back();
         let processes = Processes::launched().map_err(Failure::scene)?;
+        if processes.count() > 1 {
+            memory::give_arrays_back();
+        }
         self.processes.get_or_init(|| processes.count());
         agreed(&processes, check_likeness(&processes))?;
         let scene = agreed(&processes, self.scene_of(&processes))?;
@@ -153,8 +155,8 @@ impl Run {
             }
             Failure::Run(error)
         });
-        let ended = ended.and_then(|failure| self.report(steps, failure, &inputs, &warnings, &directory));
-        agreed(processes, ended)
+        let failure = agreed(processes, ended)?;
+        agreed(processes, self.report(steps, failure, &inputs, &warnings, &directory))
     }
 
     /// A run before its first step, in a process that writes no results.

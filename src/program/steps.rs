@@ -108,9 +108,8 @@ impl<const D: usize> Steps<D> {
     /// The results cannot be written.
     pub(crate) fn take(&mut self) -> Result<Option<AdvanceError>, Box<dyn Error>> {
         let processes = self.simulation.settings.processes.clone();
-        let mut written = Ok(());
         loop {
-            written = written.and_then(|()| self.write(Records::write_checkpoint_if_due));
+            let written = self.write(Records::write_checkpoint_if_due);
             if processes.any(written.is_err()) {
                 return written.map(|()| None);
             }
@@ -129,7 +128,10 @@ impl<const D: usize> Steps<D> {
                     check_step(&processes, &step)?;
                     let (sums, clock) = (simulation.sums(), simulation.clock);
                     self.collect_particles_if(|records| records.need_particles(&clock));
-                    written = self.write(|records, at| Ok(records.recorder.record_with(at, &step, &sums)?));
+                    let written = self.write(|records, at| Ok(records.recorder.record_with(at, &step, &sums)?));
+                    if processes.any(written.is_err()) {
+                        return written.map(|()| None);
+                    }
                 }
                 // The next round of the loop handles the interruption.
                 Err(error) if error.cause.is_stopped() => {}

@@ -174,7 +174,8 @@ impl<const D: usize, L, A> Simulation<D, L, A> {
     }
 
     /// Fills in velocity, acceleration, deformation and internal variables of all particles in process 0, until its next step. Otherwise each of
-    /// several processes may have those of its own particles alone. All processes make this call before one of them reads these arrays.
+    /// several processes may have those of its own particles alone. All processes make this call before one of them reads these arrays, asks for
+    /// energies or fields, or records the step.
     ///
     /// ```
     /// use bfree::parallel::Processes;
@@ -205,6 +206,9 @@ impl<const D: usize, L, A> Simulation<D, L, A> {
 
     /// [`Self::rearrange`], after which each process has the particles between its two `bounds`. Without bounds, every process has all.
     fn rearrange_among(&mut self, order: Option<&[u32]>, bounds: Vec<usize>) {
+        if bounds.is_empty() {
+            self.particles.join(&self.settings.processes);
+        }
         if let Some(order) = order {
             self.rearrange_common(order, bounds.is_empty());
         }

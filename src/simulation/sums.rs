@@ -45,13 +45,13 @@ impl<const D: usize, L: Law, A> Simulation<D, L, A> {
         let particles = &self.particles;
         let velocity = |p: usize| particles.velocity.get(particles.here(p));
         let kinetic = |p: usize| velocity(p).map_or(0.0, |v| 0.5 * particles.mass[p] * v.norm_squared());
-        let momentum = |p: usize, k: usize| velocity(p).filter(|_| k < D).map_or(0.0, |v| v[k] * particles.mass[p]);
         let all = (processes, particles.len());
         let scale = |p: usize| velocity(p).map_or(0.0, |v| particles.mass[p] * v.norm());
         let [kinetic, momentum_scale] = particles.parts.sum(all, [0.0; 2], |p| [kinetic(p), scale(p)]);
-        let momentum = particles.parts.sum(all, [0.0; 3], |p| std::array::from_fn(|k| momentum(p, k)));
+        let momentum =
+            particles.parts.sum(all, [0.0; D], |p| velocity(p).map_or([0.0; D], |v| (v * particles.mass[p]).into()));
         let (strain, by_laws) = (self.strain_of(processes), self.dissipated_of(processes));
-        Sums { kinetic, strain, by_laws, momentum: Vector::from_fn(|k, _| momentum[k]), momentum_scale }
+        Sums { kinetic, strain, by_laws, momentum: momentum.into(), momentum_scale }
     }
 
     /// Σ V₀ W, the strain energy of all particles.

@@ -295,26 +295,36 @@ fn files(folder: &Path) -> Result<BTreeMap<PathBuf, Vec<u8>>, Failure> {
 
 #[test]
 fn a_run_under_mpi_writes_the_same_files() -> Result<(), Failure> {
-    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/ball_drop.json");
+    // Every process has the state of all particles; only its own, and process 0 has none of them: the body is one block of cells.
+    writes_the_same_files("ball_drop.json", &["--set", "output.checkpoint=2", "--set", "output.every=0.01"])?;
+    let velocity = "output.fields=[\"velocity\", \"stress\", \"displacement\"]";
+    writes_the_same_files(
+        "rebound.json",
+        &["--set", "output.probes=[]", "--set", "output.every=0.1", "--set", velocity],
+    )
+}
+
+/// Runs of one process and of several write the same files.
+fn writes_the_same_files(scene: &str, arguments: &[&str]) -> Result<(), Failure> {
+    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(scene);
     let scene = scene.to_str().unwrap();
     for launcher in launchers() {
         let folder = tempfile::tempdir()?;
         let out = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
-        let arguments = ["--steps", "5", "--set", "output.checkpoint=2", "--set", "output.every=0.01"];
-        let run = |count: usize, name: &str, more: &[&str]| {
+        let run = |count: usize, name: &str| {
             let out = out(name);
-            said(&mut launched(&launcher, count, &[&[scene, "--out", &out], &arguments[..], more].concat()))
+            said(&mut launched(&launcher, count, &[&[scene, "--out", &out, "--steps", "5"], arguments].concat()))
         };
-        let (code, shown, told) = run(1, "one", &[])?;
+        let (code, shown, told) = run(1, "one")?;
         assert_eq!(code, Some(0), "{told}");
         for count in [2, 3] {
-            let (code, of_several, told) = run(count, &format!("of {count}"), &[])?;
+            let (code, of_several, told) = run(count, &format!("of {count}"))?;
             assert_eq!(code, Some(0), "{launcher:?}: {told}");
             assert_eq!(of_several.matches("results").count(), shown.matches("results").count(), "{of_several}");
             assert!(files(Path::new(&out("one")))? == files(Path::new(&out(&format!("of {count}"))))?, "{launcher:?}");
         }
         // An error is told once, and all processes end.
-        let (code, _, told): Said = run(3, "one", &[])?;
+        let (code, _, told): Said = run(3, "one")?;
         assert_eq!((code, told.matches("error: ").count()), (Some(2), 1), "{launcher:?}: {told}");
         let (code, _, told): Said = said(&mut launched(&launcher, 2, &["no_such_scene.json"]))?;
         assert_eq!((code, told.matches("error: ").count()), (Some(2), 1), "{launcher:?}: {told}");
@@ -334,12 +344,17 @@ fn writing_to(out: &str) -> Vec<u32> {
     numbers.filter(is_one).collect()
 }
 
-/// Sends a signal to the process `which` of a run after some of its steps.
-fn signal(signal: &str, which: usize, out: &str) -> Result<(), Failure> {
+/// Waits for some steps of a run.
+fn wait_for_steps(out: &str) {
     let written = || std::fs::read_to_string(Path::new(out).join("history.csv")).map_or(0, |text| text.lines().count());
     while written() < 4 {
         thread::sleep(Duration::from_millis(5));
     }
+}
+
+/// Sends a signal to the process `which` of a run after some of its steps.
+fn signal(signal: &str, which: usize, out: &str) -> Result<(), Failure> {
+    wait_for_steps(out);
     let mut numbers = writing_to(out);
     numbers.sort_unstable();
     let number = numbers.get(which).ok_or("the run has ended")?.to_string();
@@ -375,6 +390,31 @@ fn a_process_that_ends_ends_all() -> Result<(), Failure> {
             let (code, _, told) = said(&mut launched(&launcher, 2, &[&run[..], &["--restart"]].concat()))?;
             assert_eq!(code, Some(0), "{launcher:?} {name} {which}: {told}");
             assert!(files(Path::new(&whole))? == files(Path::new(&out))?, "{launcher:?} {name} {which}");
+        }
+    }
+    Ok(())
+}
+
+/// A snapshot, or a checkpoint, that cannot be written ends all processes, and its error is told once.
+#[test]
+fn a_file_that_cannot_be_written_ends_all_processes() -> Result<(), Failure> {
+    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/rebound.json");
+    let arguments = [scene.to_str().unwrap(), "--steps", "60", "--quiet", "--set", FINE, "--set", "output.probes=[]"];
+    for launcher in launchers() {
+        for (setting, file) in
+            [("output.every=0.5", "particles_000005.vtu"), ("output.checkpoint=1", "checkpoint_1.bfree")]
+        {
+            let folder = tempfile::tempdir()?;
+            let out = folder.path().join("out").to_str().unwrap().to_owned();
+            let mut command = launched(&launcher, 3, &[&arguments[..], &["--set", setting, "--out", &out]].concat());
+            let child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn()?;
+            wait_for_steps(&out);
+            // No file takes the place of a folder that is not empty.
+            std::fs::create_dir_all(Path::new(&out).join(file).join("x"))?;
+            let ended = child.wait_with_output()?;
+            let told = String::from_utf8_lossy(&ended.stderr);
+            assert_eq!((ended.status.code(), told.matches("error: ").count()), (Some(1), 1), "{launcher:?}: {told}");
+            assert!(told.contains(&format!("{file}: Is a directory")), "{launcher:?}: {told}");
         }
     }
     Ok(())
