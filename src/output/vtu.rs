@@ -271,7 +271,7 @@ impl Snapshot {
                 for column in columns {
                     file.write_all(column.tag().as_bytes())?;
                     offsets.push((file.stream_position()?, 0));
-                    write!(file, "{:0DIGITS$}\"/>\n", 0)?;
+                    writeln!(file, "{:0DIGITS$}\"/>", 0)?;
                 }
                 file.write_all(end.as_bytes())?;
             }
