@@ -2,7 +2,7 @@
 
 use super::Reference;
 use super::fields::padded;
-use super::vtu::{Array, Snapshot};
+use super::vtu::{Array, Head, Snapshot};
 use crate::particles::Particles;
 use crate::tensor::{Vector, identity};
 
@@ -50,7 +50,7 @@ impl<const D: usize> MovedOutlines<D> {
     }
 
     /// The outlines at the time of `head`, as segments in the order of the lines.
-    pub(crate) fn at(&self, particles: &Particles<D>, head: &Snapshot) -> Snapshot {
+    pub(crate) fn at(&self, particles: &Particles<D>, head: &Head) -> Snapshot {
         let places = particles.places();
         let (mut points, mut bodies) = (Vec::new(), Vec::new());
         for line in &self.0 {
@@ -60,7 +60,7 @@ impl<const D: usize> MovedOutlines<D> {
             bodies.resize(points.len(), f64::from(line.body));
         }
         let arrays = vec![Array::scalar("body", bodies, true)];
-        Snapshot { points, arrays, corners: 2, ..head.clone() }
+        Snapshot { time: head.time, background: head.background, points, arrays, corners: 2 }
     }
 }
 

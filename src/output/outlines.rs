@@ -1,7 +1,7 @@
 //! The surfaces of obstacles as segments and triangles, for pictures: `obstacles_*.vtu`.
 
 use super::fields::padded;
-use super::vtu::{Array, Snapshot};
+use super::vtu::{Array, Head, Snapshot};
 use crate::grid::Grid;
 use crate::mechanics::loads::{Contacts, Obstacle};
 use crate::tensor::Vector;
@@ -20,7 +20,7 @@ impl<const D: usize> Outlines<D> {
     }
 
     /// The outlines in the poses of a time, with the number of the obstacle of each corner.
-    pub(crate) fn at(&self, contacts: &Contacts<D>, time: f64, head: &Snapshot) -> Snapshot {
+    pub(crate) fn at(&self, contacts: &Contacts<D>, time: f64, head: &Head) -> Snapshot {
         let (mut points, mut numbers) = (Vec::new(), Vec::new());
         for (number, (obstacle, corners)) in contacts.obstacles.iter().zip(&self.0).enumerate() {
             let pose = obstacle.pose(time);
@@ -28,7 +28,7 @@ impl<const D: usize> Outlines<D> {
             numbers.resize(points.len(), number as f64);
         }
         let arrays = vec![Array::scalar("obstacle", numbers, true)];
-        Snapshot { points, arrays, corners: D, ..head.clone() }
+        Snapshot { time: head.time, background: head.background, points, arrays, corners: D }
     }
 }
 

@@ -1,5 +1,5 @@
-//! The values of fields at some particles, for a snapshot, from the processes that have the particles. Process 0 asks for some rows of a field, and all
-//! others answer until it has no more questions. So no process needs the state of all particles.
+//! The values of fields at some particles, for a snapshot, from the processes that have the particles. Process 0 asks for some rows of a field,
+//! and all others answer until it has no more questions. So no process needs the state of all particles.
 
 use super::{OutputError, Reference};
 use crate::field::Field;
@@ -56,7 +56,7 @@ impl<'a, const D: usize, L: Law, A: Sync> Rows<'a, D, L, A> {
         let owner = |place: &u32| parts.owner(*place as usize);
         let (places, mut lengths) = (&self.places[rows], vec![0; processes.count()]);
         places.iter().for_each(|place| lengths[owner(place)] += width);
-        let own: Vec<u32> = places.iter().copied().filter(|place| owner(place) == processes.rank()).collect();
+        let own: Vec<u32> = places.iter().copied().filter(|&place| parts.is_own(processes, place as usize)).collect();
         let values = self.evaluated(field, &own);
         let failed = values.as_ref().err().map(|error| match error {
             OutputError::Inadmissible { particle, source } => (*particle, source.det_f),

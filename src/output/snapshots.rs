@@ -6,7 +6,7 @@ use super::moved_outlines::MovedOutlines;
 use super::outlines::Outlines;
 use super::pvd::{self, SERIES};
 use super::rows::Rows;
-use super::vtu::{Background, Column, Snapshot};
+use super::vtu::{Background, Column, Head};
 use super::{OutputError, Reference, surfaces};
 use crate::clock::Clock;
 use crate::field::{Field, Kind};
@@ -157,7 +157,7 @@ impl<const D: usize> Snapshots<D> {
     fn add(
         &mut self,
         series: usize,
-        head: &Snapshot,
+        head: &Head,
         write: impl FnOnce(&Path) -> Result<(), OutputError>,
     ) -> Result<(), OutputError> {
         let file = name(SERIES[series], self.mark.written);
@@ -180,9 +180,9 @@ pub(crate) fn unique(fields: &[Field]) -> Vec<Field> {
 }
 
 /// The time and the grid of a snapshot.
-fn head<const D: usize, L, A>(simulation: &Simulation<D, L, A>) -> Snapshot {
+fn head<const D: usize, L, A>(simulation: &Simulation<D, L, A>) -> Head {
     let grid = &simulation.grid;
-    Snapshot {
+    Head {
         time: simulation.clock.time(),
         background: Background {
             dimension: D as u32,
@@ -190,8 +190,6 @@ fn head<const D: usize, L, A>(simulation: &Simulation<D, L, A>) -> Snapshot {
             spacing: grid.spacing,
             cells: std::array::from_fn(|k| grid.cells.get(k).copied().unwrap_or(0)),
         },
-        points: Vec::new(),
-        arrays: Vec::new(),
         corners: 1,
     }
 }
@@ -199,7 +197,7 @@ fn head<const D: usize, L, A>(simulation: &Simulation<D, L, A>) -> Snapshot {
 /// Writes the given fields of the particles, in the order of their ids. No other field is computed.
 fn write_particles<const D: usize, L: Law, A: Sync>(
     path: &Path,
-    head: &Snapshot,
+    head: &Head,
     simulation: &Simulation<D, L, A>,
     reference: &Reference<D>,
     fields: &[Field],
@@ -214,7 +212,7 @@ fn write_particles<const D: usize, L: Law, A: Sync>(
         let about = (field.name(), components.as_slice(), field.kind() == Kind::Index);
         columns.push(Column::new(about, count, move |rows, out| all.append(number, rows, out)));
     }
-    head.write_columns(path, columns, count, |rows, out| {
+    head.write(path, columns, count, |rows, out| {
         out.extend(all.places[rows].iter().flat_map(|&p| padded(&simulation.particles.position[p as usize])));
         Ok(())
     })

@@ -2,13 +2,13 @@
 
 use super::fields::padded;
 use super::history::AXES;
-use super::vtu::{Array, Snapshot};
+use super::vtu::{Array, Head, Snapshot};
 use crate::material::Law;
 use crate::simulation::Simulation;
 
 /// The points of the surfaces at the time of `head`. A point that touches nothing has no pressure; its gap is that to the
 /// nearest obstacle, and NaN without obstacles.
-pub(super) fn snapshot<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, head: &Snapshot) -> Snapshot {
+pub(super) fn snapshot<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, head: &Head) -> Snapshot {
     let (contacts, of) = (&simulation.loads.contacts, &simulation.particles);
     let time = simulation.clock.time();
     let poses: Vec<_> = contacts.obstacles.iter().map(|obstacle| obstacle.pose(time)).collect();
@@ -37,5 +37,5 @@ pub(super) fn snapshot<const D: usize, L: Law, A>(simulation: &Simulation<D, L, 
         Array::scalar("body", body, true),
     ];
     let points = contacts.points.iter().map(|point| padded(&of.position[point.particle])).collect();
-    Snapshot { points, arrays, corners: 1, ..head.clone() }
+    Snapshot { time: head.time, background: head.background, points, arrays, corners: 1 }
 }

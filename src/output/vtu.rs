@@ -20,8 +20,8 @@ const BLOCK: usize = 1 << 16;
 /// Blocks that are in memory at the same time.
 const AT_ONCE: usize = 64;
 
-/// Digits of an offset. A reader skips leading zeros.
-const DIGITS: usize = 15;
+/// Room for an offset and its quotation mark. Spaces fill the rest, because meshio compares the text of an offset.
+const ROOM: usize = 16;
 
 /// VTK's types of cells with one point, two and three: vertex, line and triangle.
 pub(super) const TYPES: [u8; 3] = [1, 3, 5];
@@ -83,6 +83,15 @@ impl Background {
         let whole = axes.is_some_and(|cells| !cells.is_empty() && !cells.contains(&0));
         if finite && whole { Ok(()) } else { Err(format!("{self:?} is no grid")) }
     }
+}
+
+/// What a file has besides its points and their arrays.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Head {
+    pub time: f64,
+    pub background: Background,
+    /// See [`Snapshot::corners`].
+    pub corners: usize,
 }
 
 /// Points with arrays, at one time.
@@ -229,80 +238,8 @@ impl Snapshot {
         let arrays = self.arrays.iter().map(|Array { name, components, values, is_index }| {
             Column::new((name, components, *is_index), count, copied(values, components.len()))
         });
-        let arrays = arrays.collect();
-        self.write_columns(path, arrays, count, copied(self.points.as_flattened(), 3))
-    }
-
-    /// Writes a file with these arrays, and so many points, instead of its own.
-    ///
-    /// # Errors
-    /// A value cannot be computed, or the operating system refuses.
-    pub(super) fn write_columns(
-        &self,
-        path: &Path,
-        arrays: Vec<Column<'_>>,
-        count: usize,
-        points: impl Fn(Range<usize>, &mut Vec<f64>) -> Result<(), OutputError>,
-    ) -> Result<(), OutputError> {
-        let corners = self.corners.clamp(1, TYPES.len());
-        let (cells, axes) = (count / corners, AXES.map(str::to_owned));
-        let numbers = |of: Range<usize>, step: usize| of.flat_map(move |k| ((k * step) as i64).to_le_bytes());
-        let cells_of = [
-            Column::of_cells(("Int64", "connectivity", 8), count, |rows, out| out.extend(numbers(rows, 1))),
-            Column::of_cells(("Int64", "offsets", 8), cells, |rows, out| {
-                out.extend(numbers(rows.start + 1..rows.end + 1, corners));
-            }),
-            Column::of_cells(("UInt8", "types", 1), cells, |rows, out| {
-                out.resize(out.len() + rows.len(), TYPES[corners - 1]);
-            }),
-        ];
-        let points = [Column::new(("Points", &axes, false), count, points)];
-        write_atomically(path, |file| {
-            let piece = format!("<Piece NumberOfPoints=\"{count}\" NumberOfCells=\"{cells}\">\n<PointData>\n");
-            file.write_all((self.head() + &piece).as_bytes())?;
-            let sections = [
-                (&arrays[..], "</PointData>\n<Points>\n"),
-                (&points, "</Points>\n<Cells>\n"),
-                (&cells_of, "</Cells>\n</Piece>\n</UnstructuredGrid>\n<AppendedData encoding=\"raw\">\n_"),
-            ];
-            // The offset of each column, as digits, and its place.
-            let mut offsets = Vec::new();
-            for (columns, end) in sections {
-                for column in columns {
-                    file.write_all(column.tag().as_bytes())?;
-                    offsets.push((file.stream_position()?, 0));
-                    writeln!(file, "{:0DIGITS$}\"/>", 0)?;
-                }
-                file.write_all(end.as_bytes())?;
-            }
-            let data = file.stream_position()?;
-            for ((_, offset), column) in offsets.iter_mut().zip(sections.iter().flat_map(|(columns, _)| *columns)) {
-                *offset = file.stream_position()? - data;
-                column.write(file)?;
-            }
-            file.write_all(b"\n</AppendedData>\n</VTKFile>\n")?;
-            for (place, offset) in offsets {
-                file.seek(SeekFrom::Start(place))?;
-                write!(file, "{offset:0DIGITS$}")?;
-            }
-            Ok(())
-        })
-    }
-
-    /// The XML before the points.
-    fn head(&self) -> String {
-        let Background { dimension, origin, spacing, cells } = &self.background;
-        [
-            "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" \
-             header_type=\"UInt64\" compressor=\"vtkZLibDataCompressor\">\n<UnstructuredGrid>\n<FieldData>\n",
-            &field("Float64", "TimeValue", &[self.time]),
-            &field("UInt32", "grid_dimension", &[dimension]),
-            &field("Float64", "grid_origin", origin),
-            &field("Float64", "grid_spacing", &[spacing]),
-            &field("UInt32", "grid_cells", cells),
-            "</FieldData>\n",
-        ]
-        .concat()
+        let head = Head { time: self.time, background: self.background, corners: self.corners };
+        head.write(path, arrays.collect(), count, copied(self.points.as_flattened(), 3))
     }
 
     /// Reads a file that this program has written.
@@ -348,6 +285,80 @@ impl Snapshot {
         let mut arrays = tags.map(|tag| read_array(tag, data, count)).collect::<Result<Vec<_>, _>>()?;
         let points = arrays.pop_if(|array| array.name == "Points").ok_or("no points")?;
         Ok(Self { time, background, points: points.values.as_chunks().0.to_vec(), arrays, corners })
+    }
+}
+
+impl Head {
+    /// Writes a file with these arrays and so many points, all or nothing.
+    ///
+    /// # Errors
+    /// A value cannot be computed, or the operating system refuses.
+    pub(super) fn write(
+        &self,
+        path: &Path,
+        arrays: Vec<Column<'_>>,
+        count: usize,
+        points: impl Fn(Range<usize>, &mut Vec<f64>) -> Result<(), OutputError>,
+    ) -> Result<(), OutputError> {
+        let corners = self.corners.clamp(1, TYPES.len());
+        let (cells, axes) = (count / corners, AXES.map(str::to_owned));
+        let numbers = |of: Range<usize>, step: usize| of.flat_map(move |k| ((k * step) as i64).to_le_bytes());
+        let cells_of = [
+            Column::of_cells(("Int64", "connectivity", 8), count, |rows, out| out.extend(numbers(rows, 1))),
+            Column::of_cells(("Int64", "offsets", 8), cells, |rows, out| {
+                out.extend(numbers(rows.start + 1..rows.end + 1, corners));
+            }),
+            Column::of_cells(("UInt8", "types", 1), cells, |rows, out| {
+                out.resize(out.len() + rows.len(), TYPES[corners - 1]);
+            }),
+        ];
+        let points = [Column::new(("Points", &axes, false), count, points)];
+        write_atomically(path, |file| {
+            let piece = format!("<Piece NumberOfPoints=\"{count}\" NumberOfCells=\"{cells}\">\n<PointData>\n");
+            file.write_all((self.xml() + &piece).as_bytes())?;
+            let sections = [
+                (&arrays[..], "</PointData>\n<Points>\n"),
+                (&points, "</Points>\n<Cells>\n"),
+                (&cells_of, "</Cells>\n</Piece>\n</UnstructuredGrid>\n<AppendedData encoding=\"raw\">\n_"),
+            ];
+            // The offset of each column, as digits, and its place.
+            let mut offsets = Vec::new();
+            for (columns, end) in sections {
+                for column in columns {
+                    file.write_all(column.tag().as_bytes())?;
+                    offsets.push((file.stream_position()?, 0));
+                    writeln!(file, "{:ROOM$}/>", "")?;
+                }
+                file.write_all(end.as_bytes())?;
+            }
+            let data = file.stream_position()?;
+            for ((_, offset), column) in offsets.iter_mut().zip(sections.iter().flat_map(|(columns, _)| *columns)) {
+                *offset = file.stream_position()? - data;
+                column.write(file)?;
+            }
+            file.write_all(b"\n</AppendedData>\n</VTKFile>\n")?;
+            for (place, offset) in offsets {
+                file.seek(SeekFrom::Start(place))?;
+                write!(file, "{offset}\"")?;
+            }
+            Ok(())
+        })
+    }
+
+    /// The XML before the points.
+    fn xml(&self) -> String {
+        let Background { dimension, origin, spacing, cells } = &self.background;
+        [
+            "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" \
+             header_type=\"UInt64\" compressor=\"vtkZLibDataCompressor\">\n<UnstructuredGrid>\n<FieldData>\n",
+            &field("Float64", "TimeValue", &[self.time]),
+            &field("UInt32", "grid_dimension", &[dimension]),
+            &field("Float64", "grid_origin", origin),
+            &field("Float64", "grid_spacing", &[spacing]),
+            &field("UInt32", "grid_cells", cells),
+            "</FieldData>\n",
+        ]
+        .concat()
     }
 }
 

@@ -115,6 +115,11 @@ impl Parts {
         particle - self.first
     }
 
+    /// Whether this process has the particle as its own.
+    pub(crate) fn is_own(&self, processes: &Processes, particle: usize) -> bool {
+        self.of(processes.rank()).contains(&particle)
+    }
+
     /// The process that has a particle.
     pub(crate) fn owner(&self, particle: usize) -> usize {
         self.bounds.partition_point(|&first| first <= particle) - 1
@@ -158,7 +163,7 @@ impl Parts {
 
     /// The change by which process 0 gets all particles, from those that every process has after [`Self::kept`]; and the parts then.
     pub(crate) fn collected<'a>(&'a self, processes: &'a Processes) -> (Collected<'a>, Self) {
-        let first = if processes.rank() == 0 { 0 } else { self.first };
+        let first = if processes.is_first() { 0 } else { self.first };
         (Collected { processes, parts: self, to_everyone: false }, Self { first, ..self.clone() })
     }
 
@@ -183,8 +188,7 @@ impl Parts {
         if self.are_whole() {
             return some.into_iter().map(value).collect();
         }
-        let own = self.of(processes.rank());
-        let here = some.into_iter().filter(|p| own.contains(p));
+        let here = some.into_iter().filter(|&p| self.is_own(processes, p));
         processes.told(&here.map(value).collect::<Vec<R>>()).into_iter().flatten().collect()
     }
 

@@ -70,6 +70,11 @@ impl Processes {
         self.0.as_ref().map_or(1, |exchange| exchange.count())
     }
 
+    /// Whether this is process 0, which writes the results.
+    pub(crate) fn is_first(&self) -> bool {
+        self.rank() == 0
+    }
+
     /// Whether there is more than one process.
     pub(crate) fn are_several(&self) -> bool {
         self.0.is_some()
@@ -86,10 +91,10 @@ impl Processes {
     /// The parts of all processes, whose lengths are known, joined in their order in process 0. The others receive nothing.
     pub(crate) fn collected<T: Pod>(&self, lengths: &[usize], own: &[T]) -> Option<Vec<T>> {
         let Some(exchange) = &self.0 else { return Some(own.to_vec()) };
-        let mut all = if self.rank() == 0 { vec![T::zeroed(); lengths.iter().sum()] } else { Vec::new() };
+        let mut all = if self.is_first() { vec![T::zeroed(); lengths.iter().sum()] } else { Vec::new() };
         let lengths: Vec<usize> = lengths.iter().map(|length| length * size_of::<T>()).collect();
         exchange.collect(&lengths, bytemuck::cast_slice(own), bytemuck::cast_slice_mut(&mut all));
-        (self.rank() == 0).then_some(all)
+        self.is_first().then_some(all)
     }
 
     /// The lists of all processes, joined in their order, and their lengths.

@@ -136,9 +136,10 @@ impl Run {
 
     fn execute_in<const D: usize>(&self, scene: &Scene, start: Instant, processes: &Processes) -> Result<(), Failure> {
         let simulation = self.scene.build_among::<D>(scene, processes)?;
-        let prepared = match processes.rank() {
-            0 => self.prepared(simulation, scene, start),
-            _ => self.prepared_without_records(simulation, scene),
+        let prepared = if processes.is_first() {
+            self.prepared(simulation, scene, start)
+        } else {
+            self.prepared_without_records(simulation, scene)
         };
         memory::give_back();
         let Prepared { mut steps, inputs, warnings, directory, _lock } = agreed(processes, prepared)?;
