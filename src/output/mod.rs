@@ -20,6 +20,7 @@
 //! [`plot::plot_run`] draws pictures of a directory, and a page with a player of the snapshots. Floats in text files have enough digits to
 //! give back the same bits.
 
+mod asked;
 mod contact;
 mod counts;
 mod csv;
@@ -50,6 +51,7 @@ mod vtkhdf;
 pub mod vtu;
 pub mod warnings;
 
+pub(crate) use asked::Asked;
 pub(crate) use earlier::{Role, foreign, held, outcome, role};
 pub use error::OutputError;
 pub use mark::Mark;
@@ -58,7 +60,6 @@ pub use progress::Audience;
 pub use recorder::{OutputSettings, Recorder};
 pub use reference::Reference;
 pub use report::Outcome;
-pub(crate) use rows::end_or_answer;
 pub(crate) use snapshots::unique;
 pub use summary::Summary;
 pub(crate) use vtkhdf::pack;

@@ -1,6 +1,7 @@
 //! `probes.csv`: fields at chosen particles or points against time.
 
 use super::csv::{Row, cell};
+use super::rows::collected;
 use super::{OutputError, Reference};
 use crate::field::Field;
 use crate::material::Law;
@@ -63,17 +64,49 @@ impl<const D: usize> Probe<D> {
         }
     }
 
-    /// Difference between the material point and its particle: F d in the position, H d in the displacement.
-    fn beside(&self, particles: &Particles<D>) -> Option<Vector<f64, D>> {
-        let Place::Carried { particle, offset } = self.place else { return None };
-        let moved = particles.displacement_gradient[particles.place(particle)?] * offset;
-        match self.field {
-            Field::Position => Some(offset + moved),
-            Field::Displacement => Some(moved),
-            _ => None,
+    /// The offset d of a carried point whose place is read.
+    fn offset(&self) -> Option<Vector<f64, D>> {
+        let Place::Carried { offset, .. } = self.place else { return None };
+        matches!(self.field, Field::Position | Field::Displacement).then_some(offset)
+    }
+
+    /// The length of [`Self::state_at`].
+    pub(super) fn state_len(&self) -> usize {
+        let components = self.field.kind().components().len();
+        if self.field.needs_state() { components } else { self.offset().map_or(0, |_| D) }
+    }
+
+    /// What the probe needs of the state of a particle of this process: the values of the field, or H d of a carried point.
+    pub(super) fn state_at<L: Law, A>(
+        &self,
+        simulation: &Simulation<D, L, A>,
+        place: usize,
+    ) -> Result<Vec<f64>, OutputError> {
+        let (particles, mut values) = (&simulation.particles, Vec::new());
+        if self.field.needs_state() {
+            self.field.append_at_all(simulation, &Reference::unknown(), &[place as u32], &mut values)?;
+        } else if let Some(offset) = self.offset() {
+            values.extend(&(particles.displacement_gradient[particles.here(place)] * offset));
         }
+        Ok(values)
+    }
+
+    /// [`Self::state_at`] in process 0, from the process that has the particle; nothing in the others.
+    pub(super) fn exchanged<L: Law, A>(
+        &self,
+        simulation: &Simulation<D, L, A>,
+        place: usize,
+    ) -> Result<Option<Vec<f64>>, OutputError> {
+        let (processes, parts) = (&simulation.settings.processes, &simulation.particles.parts);
+        let mut lengths = vec![0; processes.count()];
+        lengths[parts.owner(place)] = self.state_len();
+        let is_own = parts.is_own(processes, place);
+        collected(processes, &lengths, if is_own { self.state_at(simulation, place) } else { Ok(Vec::new()) })
     }
 }
+
+/// The question for the number of a probe, and the place of its particle.
+pub(super) const PROBE: u64 = u64::MAX - 1;
 
 /// Id and distance of the particle nearest to `point`, among the particles of `body` if it is given. Among equally near particles, the
 /// smallest id counts.
@@ -105,6 +138,34 @@ pub fn nearest<const D: usize>(
         .map(|(id, square)| (id, square.sqrt()))
 }
 
+/// The values of a probe, given by its number, at a particle. Those of a carried point are F d beside those of the particle in the position, H d in
+/// the displacement.
+fn values<const D: usize, L: Law, A>(
+    number: usize,
+    (probes, particle): (&[Probe<D>], usize),
+    simulation: &Simulation<D, L, A>,
+    reference: &Reference<D>,
+) -> Result<Vec<f64>, OutputError> {
+    let (probe, particles) = (&probes[number], &simulation.particles);
+    probe.field.check(simulation)?;
+    let count = particles.len();
+    let place = particles.place(particle).ok_or(OutputError::NoParticle { particle, particles: count })?;
+    let state = if probe.state_len() == 0 || particles.are_all_here() {
+        probe.state_at(simulation, place)?
+    } else {
+        simulation.settings.processes.each([PROBE, number as u64, place as u64]);
+        probe.exchanged(simulation, place)?.unwrap_or_default()
+    };
+    if probe.field.needs_state() {
+        return Ok(state);
+    }
+    let mut values = Vec::new();
+    probe.field.append(simulation, reference, particle, &mut values)?;
+    let offset = probe.offset().filter(|_| probe.field == Field::Position).unwrap_or_else(Vector::zeros);
+    values.iter_mut().zip(&offset).zip(state).for_each(|((value, offset), moved)| *value += offset + moved);
+    Ok(values)
+}
+
 /// The present row of `probes.csv`.
 pub(crate) fn row<const D: usize, L: Law, A>(
     probes: &[Probe<D>],
@@ -113,14 +174,11 @@ pub(crate) fn row<const D: usize, L: Law, A>(
 ) -> Result<Row, OutputError> {
     reference.check(simulation)?;
     let mut row = vec![("time".to_owned(), cell(simulation.clock.time()))];
-    for probe in probes {
-        let mut values = Vec::new();
-        match probe.particle(&simulation.particles)? {
-            Some(particle) => probe.field.append(simulation, reference, particle, &mut values)?,
-            None => values.resize(probe.field.kind().components().len(), f64::NAN),
-        }
-        let beside = probe.beside(&simulation.particles);
-        beside.iter().flatten().zip(&mut values).for_each(|(add, value)| *value += add);
+    for (number, probe) in probes.iter().enumerate() {
+        let values = match probe.particle(&simulation.particles)? {
+            Some(particle) => values(number, (probes, particle), simulation, reference)?,
+            None => vec![f64::NAN; probe.field.kind().components().len()],
+        };
         let cells = values.into_iter().map(cell);
         match probe.component {
             Some(component) => row.extend(cells.skip(component).take(1).map(|cell| (probe.name.clone(), cell))),

@@ -198,7 +198,7 @@ impl<const D: usize> Recorder<D> {
     /// Whether [`Self::record_with`] needs the state of all particles in this process.
     pub(crate) fn needs_particles(&self, clock: &Clock) -> bool {
         let is_due = |snapshots: &Snapshots<D>| snapshots.need_particles() && snapshots.is_next(clock);
-        !self.probes.is_empty() || self.snapshots.as_ref().is_some_and(is_due)
+        self.snapshots.as_ref().is_some_and(is_due)
     }
 
     /// Whether [`Self::finish`] needs the state of all particles in this process.

@@ -44,6 +44,11 @@ impl<const D: usize> Reference<D> {
         }
     }
 
+    /// A reference without particles, for fields that do not depend on the start.
+    pub(super) fn unknown() -> Self {
+        Self { position: Vec::new(), energy: 0.0, momentum: Vector::zeros() }
+    }
+
     /// Checks that the reference has the particles of `simulation`. Points that were added to its surfaces since the start are not in the reference.
     pub(crate) fn check<L, A>(&self, simulation: &Simulation<D, L, A>) -> Result<(), OutputError> {
         let is_half = |added: &&Added<D>| matches!(added, Added::Half { .. });

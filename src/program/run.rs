@@ -11,7 +11,7 @@ use super::steps::{Records, Schedule, Steps};
 use crate::checkpoint::{self, Checkpoints, Identity, Restored};
 use crate::memory;
 use crate::output::plot::{Look, plot_run};
-use crate::output::{Audience, Outcome, OutputSettings, Recorder, Reference, Summary, end_or_answer, unique};
+use crate::output::{Asked, Audience, Outcome, OutputSettings, Recorder, Reference, Summary, unique};
 use crate::parallel::{self, Processes};
 use crate::plan::SurfaceUse;
 use crate::scene::{Scene, time::MAX_STEPS};
@@ -95,6 +95,11 @@ enum Form {
     Json,
 }
 
+/// What process 0 may ask the others for.
+fn asked<const D: usize>(scene: &Scene, probes: &[Bound<D>]) -> Asked<D> {
+    Asked { fields: unique(&scene.fields()), probes: probes.iter().map(|bound| bound.probe.clone()).collect() }
+}
+
 impl Run {
     /// Whether messages are written as JSON, for a program.
     pub(crate) fn tells_json(&self) -> bool {
@@ -167,6 +172,7 @@ impl Run {
         scene: &Scene,
     ) -> Result<Prepared<D>, Failure> {
         let directory = directory::of_results(self.out.as_deref(), &self.scene.scene)?;
+        let asked = asked(scene, &bound_probes(scene, &simulation));
         if self.restart {
             let settings = serde_json::to_value(scene).map_err(Failure::run)?;
             let identity = Identity::new(settings, &simulation.particles).with_files(scene.curve_files());
@@ -175,7 +181,7 @@ impl Run {
         simulation.settings.check_tangent = self.check_tangent.and_then(NonZeroU64::new);
         let schedule = Schedule::new(&simulation.clock, scene.time.end, self.steps);
         let interrupted = stop_on_interrupt().map_err(Failure::run)?;
-        let steps = Steps { simulation, records: None, fields: unique(&scene.fields()), schedule, interrupted };
+        let steps = Steps { simulation, records: None, asked, schedule, interrupted };
         Ok(Prepared { steps, inputs: Map::new(), warnings: Vec::new(), directory, _lock: None })
     }
 
@@ -190,6 +196,7 @@ impl Run {
         simulation.settings.check_tangent = self.check_tangent.and_then(NonZeroU64::new);
         let directory = directory::of_results(self.out.as_deref(), &self.scene.scene)?;
         let probes = bound_probes(scene, &simulation);
+        let asked = asked(scene, &probes);
         let (inputs, warnings) = self.inputs(scene, &simulation, &probes, &directory)?;
         let settings = serde_json::to_value(scene).map_err(Failure::run)?;
         let provenance = self.provenance(&directory, &settings)?;
@@ -199,7 +206,7 @@ impl Run {
             directory: directory.clone(),
             fields: scene.fields(),
             snapshot_every: scene.output.every,
-            probes: probes.iter().map(|bound| bound.probe.clone()).collect(),
+            probes: asked.probes.clone(),
             end_time: schedule.end_time(&simulation.clock),
             audience: match self.progress {
                 _ if self.quiet => Audience::Nobody,
@@ -231,7 +238,7 @@ impl Run {
             Checkpoints::new(directory.clone(), identity, self.options(&directory), every, restored.as_ref())
         });
         let records = Some(Records { recorder, checkpoints });
-        let steps = Steps { simulation, records, fields: unique(&scene.fields()), schedule, interrupted };
+        let steps = Steps { simulation, records, asked, schedule, interrupted };
         Ok(Prepared { steps, inputs, warnings, directory, _lock: lock })
     }
 
@@ -296,7 +303,7 @@ impl Run {
             }
         };
         let summary = steps.records.map(|records| records.recorder.finish(&steps.simulation, inputs, outcome));
-        end_or_answer(&steps.simulation, &steps.fields);
+        steps.asked.end_or_answer(&steps.simulation);
         if let Some(summary) = summary {
             self.show(&summary.map_err(Failure::run)?, warnings, directory)?;
         }

@@ -3,8 +3,7 @@
 use super::agreement::check_step;
 use crate::checkpoint::Checkpoints;
 use crate::clock::Clock;
-use crate::field::Field;
-use crate::output::{Recorder, end_or_answer};
+use crate::output::{Asked, Recorder};
 use crate::parallel::in_pool;
 use crate::simulation::{AdvanceError, Simulation};
 use std::error::Error;
@@ -94,8 +93,8 @@ pub(super) struct Steps<const D: usize> {
     pub simulation: Simulation<D>,
     /// `None` in all processes but the first.
     pub records: Option<Records<D>>,
-    /// The fields of the snapshots.
-    pub fields: Vec<Field>,
+    /// What process 0 may ask the others for, to write its records.
+    pub asked: Asked<D>,
     pub schedule: Schedule,
     /// Set by another thread to end the run after a whole step.
     pub interrupted: Arc<AtomicBool>,
@@ -156,7 +155,7 @@ impl<const D: usize> Steps<D> {
         write: impl FnOnce(&mut Records<D>, &Simulation<D>) -> Result<(), Box<dyn Error>>,
     ) -> Result<(), Box<dyn Error>> {
         let written = self.records.as_mut().map_or(Ok(()), |records| write(records, &self.simulation));
-        end_or_answer(&self.simulation, &self.fields);
+        self.asked.end_or_answer(&self.simulation);
         written
     }
 }

@@ -320,11 +320,14 @@ fn files(folder: &Path) -> Result<BTreeMap<PathBuf, Vec<u8>>, Failure> {
 fn a_run_under_mpi_writes_the_same_files() -> Result<(), Failure> {
     // Every process has the state of all particles; only its own, and process 0 has none of them: the body is one block of cells.
     writes_the_same_files("ball_drop.json", &["--set", "output.checkpoint=2", "--set", "output.every=0.01"])?;
-    let velocity = "output.fields=[\"velocity\", \"stress\", \"displacement\"]";
-    writes_the_same_files(
-        "rebound.json",
-        &["--set", "output.probes=[]", "--set", "output.every=0.1", "--set", velocity],
-    )
+    let fields = "output.fields=[\"velocity\", \"stress\", \"displacement\"]";
+    let probes = json!([
+        {"name": "particle", "field": "stress", "at": {"particle": [2.5, 2.6]}},
+        {"name": "carried", "field": "displacement", "at": {"body_point": [3.1, 2.2]}},
+        {"name": "nearest", "field": "velocity", "at": {"point": [2.5, 2.5]}},
+    ]);
+    let probes = format!("output.probes={probes}");
+    writes_the_same_files("rebound.json", &["--set", &probes, "--set", "output.every=0.1", "--set", fields])
 }
 
 /// Runs of one process and of several write the same files.
