@@ -28,8 +28,8 @@ pub(crate) fn give_back() {
     malloc_trim(0);
 }
 
-/// Lets the program give arrays from 1 MiB on back to the operating system when it frees them. glibc raises this size, to 32 MiB, when such arrays are
-/// freed: of 512,000 particles in four processes, each then keeps 25 MiB more.
+/// Lets the program give arrays from 1 MiB on back to the operating system when it frees them. glibc would raise this size to
+/// 32 MiB when such arrays are freed. With 512,000 particles in four processes, each process would keep 25 MiB more.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 #[allow(unsafe_code)]
 pub(crate) fn give_arrays_back() {

@@ -151,7 +151,7 @@ impl<'a, const D: usize> Reference<'a, D> {
     /// H = F − I of the particle at index `p`.
     #[inline(always)]
     pub(crate) fn displacement_gradient(&self, p: usize) -> &'a Tensor<f64, D> {
-        &self.displacement_gradient[self.parts.here(p)]
+        &self.displacement_gradient[self.parts.local_index(p)]
     }
 
     /// θ − 1 of the particle at index `p`.
@@ -269,7 +269,7 @@ impl<const D: usize> Particles<D> {
     /// The state at t_n of the particle at the place `p` in memory, for a step of length `dt`.
     #[inline(always)]
     pub fn state(&self, p: usize, dt: f64) -> MaterialState<'_, f64, D> {
-        let here = self.here(p);
+        let here = self.local_index(p);
         let internal = &self.memory[here * self.variable_count..(here + 1) * self.variable_count];
         MaterialState::new(self.displacement_gradient[here]).in_step(dt, internal)
     }
@@ -390,8 +390,8 @@ impl<const D: usize> Particles<D> {
 
     /// The index of a particle of this process in the arrays of v, a and H.
     #[inline(always)]
-    pub(crate) fn here(&self, p: usize) -> usize {
-        self.parts.here(p)
+    pub(crate) fn local_index(&self, p: usize) -> usize {
+        self.parts.local_index(p)
     }
 
     /// Changes the arrays that a process may have of its own particles alone.
@@ -465,7 +465,7 @@ impl<const D: usize> Particles<D> {
 
     /// V₀ J, the present volume of a particle.
     pub(crate) fn present_volume(&self, p: usize) -> f64 {
-        self.volume[p] * Deformation::new(self.displacement_gradient[self.here(p)]).jacobian
+        self.volume[p] * Deformation::new(self.displacement_gradient[self.local_index(p)]).jacobian
     }
 
     /// Σ ½ m v·v

@@ -223,7 +223,7 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
             let h = Kinematics(particles).displacement_gradient(p, &connectivity.gradient_at(p, phi));
             (h, particles.state(p, self.step.dt).internal.to_vec())
         };
-        // Every process hears of every failure.
+        // Every process needs all states, so that all of them see the same failure.
         let states = particles.parts.of_some(connectivity.processes(), some(), state);
         for (p, (h, internal)) in some().zip(&states) {
             let at = MaterialState::new(*h).in_step(self.step.dt, internal);

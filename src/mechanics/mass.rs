@@ -89,7 +89,7 @@ impl<const D: usize> Mass<'_, D> {
         let lumped = restricted(&space, self.lumped);
         let right = |field: &[Vector<f64, D>]| {
             let mut out: Pooled<Vector<f64, D>> = self.connectivity.field();
-            self.connectivity.spread(&mut out, |p| field[self.particles.here(p)] * self.particles.mass[p]);
+            self.connectivity.spread(&mut out, |p| field[self.particles.local_index(p)] * self.particles.mass[p]);
             space.followers().restrict(&mut out);
             out
         };

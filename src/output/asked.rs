@@ -1,5 +1,5 @@
-//! The questions of process 0 while it writes records. They ask for rows of a field, or for a probe, and all other processes answer until there are no
-//! more. So no process needs the state of all particles.
+//! The questions of process 0 while it writes records. A question asks for rows of a field, or for a probe. All other processes answer until process 0
+//! has no more questions. So no process needs the state of all particles.
 
 use super::Reference;
 use super::probes::{PROBE, Probe};
@@ -11,7 +11,7 @@ use crate::simulation::Simulation;
 /// The end of the questions. A question is the number of a field, and the first and the last row.
 const END: [u64; 3] = [u64::MAX; 3];
 
-/// What process 0 may ask for: the fields of snapshots, and probes.
+/// The fields of snapshots and the probes, for which process 0 may ask.
 #[derive(Clone, Debug)]
 pub(crate) struct Asked<const D: usize> {
     pub fields: Vec<Field>,
@@ -27,7 +27,7 @@ impl<const D: usize> Asked<D> {
         let mut rows = None;
         loop {
             let [number, first, last] = processes.each(END)[0];
-            // Process 0 hears of an error.
+            // Process 0 receives the error.
             if number == PROBE {
                 let _ = self.probes[first as usize].exchanged(simulation, last as usize);
             } else if let Some(field) = self.fields.get(number as usize) {

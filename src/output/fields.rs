@@ -85,7 +85,7 @@ impl Field {
         };
         let symmetric = |tensor: Tensor<f64, 3>| SYMMETRIC.map(|component| tensor[component]);
         let rate = |rates: &[Vector<f64, D>]| {
-            rates.get(particles.here(place)).map(padded).ok_or_else(|| OutputError::Inertia(self.clone()))
+            rates.get(particles.local_index(place)).map(padded).ok_or_else(|| OutputError::Inertia(self.clone()))
         };
         let recalled = |name| internal_variable(law, &at(), name).unwrap_or(0.0);
         match self {

@@ -49,6 +49,7 @@ mod surfaces;
 mod touched;
 mod vtkhdf;
 pub mod vtu;
+mod vtu_writer;
 pub mod warnings;
 
 pub(crate) use asked::Asked;

@@ -2,7 +2,8 @@
 
 use super::Reference;
 use super::fields::padded;
-use super::vtu::{Array, Head, Snapshot};
+use super::vtu::{Array, Snapshot};
+use super::vtu_writer::Head;
 use crate::particles::Particles;
 use crate::tensor::{Vector, identity};
 

@@ -1,7 +1,8 @@
 //! The surfaces of obstacles as segments and triangles, for pictures: `obstacles_*.vtu`.
 
 use super::fields::padded;
-use super::vtu::{Array, Head, Snapshot};
+use super::vtu::{Array, Snapshot};
+use super::vtu_writer::Head;
 use crate::grid::Grid;
 use crate::mechanics::loads::{Contacts, Obstacle};
 use crate::tensor::Vector;

@@ -76,7 +76,7 @@ impl<const D: usize> Probe<D> {
         if self.field.needs_state() { components } else { self.offset().map_or(0, |_| D) }
     }
 
-    /// What the probe needs of the state of a particle of this process: the values of the field, or H d of a carried point.
+    /// The values that the probe takes from the state of a particle of this process: those of the field, or H d of a carried point.
     pub(super) fn state_at<L: Law, A>(
         &self,
         simulation: &Simulation<D, L, A>,
@@ -86,7 +86,7 @@ impl<const D: usize> Probe<D> {
         if self.field.needs_state() {
             self.field.append_at_all(simulation, &Reference::unknown(), &[place as u32], &mut values)?;
         } else if let Some(offset) = self.offset() {
-            values.extend(&(particles.displacement_gradient[particles.here(place)] * offset));
+            values.extend(&(particles.displacement_gradient[particles.local_index(place)] * offset));
         }
         Ok(values)
     }
@@ -105,7 +105,7 @@ impl<const D: usize> Probe<D> {
     }
 }
 
-/// The question for the number of a probe, and the place of its particle.
+/// The first number of a question for a probe. The number of the probe and the place of its particle follow.
 pub(super) const PROBE: u64 = u64::MAX - 1;
 
 /// Id and distance of the particle nearest to `point`, among the particles of `body` if it is given. Among equally near particles, the

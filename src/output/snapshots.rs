@@ -6,7 +6,8 @@ use super::moved_outlines::MovedOutlines;
 use super::outlines::Outlines;
 use super::pvd::{self, SERIES};
 use super::rows::Rows;
-use super::vtu::{Background, Column, Head};
+use super::vtu::Background;
+use super::vtu_writer::{Column, Head};
 use super::{OutputError, Reference, surfaces};
 use crate::clock::Clock;
 use crate::field::{Field, Kind};
@@ -119,7 +120,7 @@ impl<const D: usize> Snapshots<D> {
         self.bodies.is_some()
     }
 
-    /// What the next call of [`Self::is_due`] says.
+    /// The answer of the next call of [`Self::is_due`].
     pub(crate) fn is_next(&self, clock: &Clock) -> bool {
         self.mark.passed.is_none_or(|before| multiples(clock, self.every) > before)
     }

@@ -2,7 +2,8 @@
 
 use super::fields::padded;
 use super::history::AXES;
-use super::vtu::{Array, Head, Snapshot};
+use super::vtu::{Array, Snapshot};
+use super::vtu_writer::Head;
 use crate::material::Law;
 use crate::simulation::Simulation;
 

@@ -111,7 +111,7 @@ impl Parts {
 
     /// The index of the row of a particle of this process.
     #[inline(always)]
-    pub(crate) fn here(&self, particle: usize) -> usize {
+    pub(crate) fn local_index(&self, particle: usize) -> usize {
         particle - self.first
     }
 
@@ -175,7 +175,7 @@ impl Parts {
     /// The change by which a process forgets the particles of others, and the parts then.
     pub(crate) fn kept(&self, processes: &Processes) -> (Kept, Self) {
         let own = self.of(processes.rank());
-        (Kept(self.here(own.start)..self.here(own.end)), Self { first: own.start, ..self.clone() })
+        (Kept(self.local_index(own.start)..self.local_index(own.end)), Self { first: own.start, ..self.clone() })
     }
 
     /// `value(p)` of some particles in the order of memory, which their own processes evaluate.

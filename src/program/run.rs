@@ -95,7 +95,7 @@ enum Form {
     Json,
 }
 
-/// What process 0 may ask the others for.
+/// The fields and probes for which process 0 may ask the others.
 fn asked<const D: usize>(scene: &Scene, probes: &[Bound<D>]) -> Asked<D> {
     Asked { fields: unique(&scene.fields()), probes: probes.iter().map(|bound| bound.probe.clone()).collect() }
 }

@@ -93,7 +93,7 @@ pub(super) struct Steps<const D: usize> {
     pub simulation: Simulation<D>,
     /// `None` in all processes but the first.
     pub records: Option<Records<D>>,
-    /// What process 0 may ask the others for, to write its records.
+    /// The fields and probes for which process 0 may ask the others.
     pub asked: Asked<D>,
     pub schedule: Schedule,
     /// Set by another thread to end the run after a whole step.

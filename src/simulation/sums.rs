@@ -43,7 +43,7 @@ impl<const D: usize, L: Law, A> Simulation<D, L, A> {
 
     fn sums_of(&self, processes: Option<&Processes>) -> Sums<D> {
         let particles = &self.particles;
-        let velocity = |p: usize| particles.velocity.get(particles.here(p));
+        let velocity = |p: usize| particles.velocity.get(particles.local_index(p));
         let kinetic = |p: usize| velocity(p).map_or(0.0, |v| 0.5 * particles.mass[p] * v.norm_squared());
         let all = (processes, particles.len());
         let scale = |p: usize| velocity(p).map_or(0.0, |v| particles.mass[p] * v.norm());

@@ -75,7 +75,7 @@ impl<'a, T: Real> States<'a, T> {
     fn with_start<const D: usize>(mut self, particles: &Particles<D>, group: &[u32]) -> Self {
         let mut start = [[0.0; 9]; LANES];
         for (rows, &p) in start.iter_mut().zip(group) {
-            let h = &particles.displacement_gradient[particles.here(p as usize)];
+            let h = &particles.displacement_gradient[particles.local_index(p as usize)];
             rows[..D * D].copy_from_slice(h.transpose().as_slice());
         }
         self.start = Some(start);

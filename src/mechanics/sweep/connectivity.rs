@@ -330,7 +330,7 @@ impl<const D: usize> Connectivity<D> {
         self.tiled().map_or(0..self.particles(), Tiled::own_particles)
     }
 
-    /// The first particle of each process in the order of the passes; at the end, the number of particles. Empty with one process.
+    /// The first particle of each process in the order of the passes; at the end, the number of particles. The list is empty with one process.
     pub(crate) fn bounds(&self) -> Vec<usize> {
         self.tiled().map_or_else(Vec::new, Tiled::bounds)
     }

@@ -109,7 +109,7 @@ impl<'a, const D: usize, L: Law> DilatationOfStep<'a, D, L> {
     fn ends<T: Number>(&self, p: usize, g: &Tensor<T, D>) -> Ends<T, D> {
         let particles = self.step.particles;
         let middle = Kinematics(particles).displacement_gradient(p, g);
-        let before = particles.displacement_gradient[particles.here(p)].map(T::lit);
+        let before = particles.displacement_gradient[particles.local_index(p)].map(T::lit);
         let after = scaled(&middle, T::lit(2.0)) - before;
         Ends { ends: [before, after].map(Deformation::new), middle: identity::<T, D>() + middle }
     }

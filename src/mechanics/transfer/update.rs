@@ -292,7 +292,7 @@ impl<'a, const D: usize> Update<'a, D> {
         dt: f64,
     ) -> Option<usize> {
         let variable_count = particles.variable_count;
-        // The internal variables of the particles that are here, see [`Particles::here`].
+        // The internal variables of the particles of this process, by their local index.
         let (mut next, undefined) = (parallel::copy_of(&particles.memory), First::none());
         if variable_count > 0 || !particles.dilatation.is_empty() {
             let (own, changes) = (connectivity.own_particles(), self.changes(connectivity));
@@ -308,7 +308,7 @@ impl<'a, const D: usize> Update<'a, D> {
                     undefined.keep(particles.id[p] as usize, ());
                 }
             };
-            let mut left = &mut next[particles.here(own.start) * variable_count..];
+            let mut left = &mut next[particles.local_index(own.start) * variable_count..];
             let part = |first: usize| {
                 let particles = first..own.end.min(first + PART);
                 Some((particles.clone(), left.split_off_mut(..particles.len() * variable_count)?))
@@ -346,7 +346,8 @@ impl<'a, const D: usize> Update<'a, D> {
         // Without inertia there are no increments.
         if !self.delta_velocity.is_empty() {
             let (own, changes) = (connectivity.own_particles(), self.changes(connectivity));
-            let (here, whole) = (particles.here(own.start)..particles.here(own.end), particles.are_whole());
+            let (here, whole) =
+                (particles.local_index(own.start)..particles.local_index(own.end), particles.are_whole());
             let fields = [&mut particles.velocity, &mut particles.acceleration];
             for (order, field) in fields.into_iter().enumerate() {
                 let smoothed = self.smoothed.as_ref().map(|smoothed| &smoothed[order][own.clone()]);
@@ -365,7 +366,7 @@ impl<'a, const D: usize> Update<'a, D> {
     /// Writes x = x_r + Δx and F = (I + ∇_r φ) F_r. Returns the largest strain since the last grid reset.
     fn move_particles(&self, particles: &mut Particles<D>, connectivity: &Connectivity<D>) -> f64 {
         let (own, changes) = (connectivity.own_particles(), self.changes(connectivity));
-        let (here, whole) = (particles.here(own.start)..particles.here(own.end), particles.are_whole());
+        let (here, whole) = (particles.local_index(own.start)..particles.local_index(own.end), particles.are_whole());
         let Particles { position, displacement_gradient, reference, .. } = particles;
         let (first, reference) = ([own.start, here.start], reference.as_ref());
         let (x, h) = (&mut position[own], &mut displacement_gradient[here]);
@@ -414,7 +415,7 @@ fn yielding<const D: usize, L: Law>(
     }
     let place = |p: usize| plastic_strain[particles.body[p] as usize];
     let yields = particles.parts.everywhere(connectivity.processes(), |p| {
-        let variable = place(p).map(|place| particles.here(p) * particles.variable_count + place);
+        let variable = place(p).map(|place| particles.local_index(p) * particles.variable_count + place);
         u8::from(variable.is_some_and(|variable| next[variable] > particles.memory[variable]))
     });
     let (mut plastic, mut yielding) = (0.0, 0.0);
